@@ -1,0 +1,35 @@
+"""The errors that the library raises; all are :class:`LsuMeshError`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class LsuMeshError(Exception):
+    """Base class of every error that ``lsu_mesh`` raises on purpose."""
+
+
+class ModelError(LsuMeshError, ValueError):
+    """A model, a set or an option is malformed; the message names the field, the value and the remedy."""
+
+
+class InconsistentData(LsuMeshError):
+    """The data contradict the declared bounds: the intersection of the sets is *proved* empty.
+
+    Attributes
+    ----------
+    rows:
+        Indices of the outputs whose strip takes part in the contradiction, empty where no output is to blame.
+    gap:
+        Smallest distance, in the unit of the first row of ``rows``, by which the strip misses the set
+        (``nan`` when only the combination of several strips is contradictory).
+    """
+
+    def __init__(self, message: str, rows: Sequence[int] = (), gap: float = float("nan")) -> None:
+        super().__init__(message)
+        self.rows = tuple(rows)
+        self.gap = gap
+
+
+class UnboundedSupport(LsuMeshError):
+    """A bounded set was needed and none is known (infinite prior, no domain)."""
