@@ -1,0 +1,191 @@
+"""The tables of peers: plant, sensors, filters, fusion."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from pathlib import Path
+
+from lsu_mesh.errors import ModelError
+from lsu_mesh.filters.registry import FILTERS, filter_class
+from lsu_mesh.mesh.config.settings import (
+    FilterSettings,
+    FusionSettings,
+    MeasurementFileSettings,
+    PlantSettings,
+    SensorFault,
+    SensorSettings,
+)
+from lsu_mesh.mesh.config.table import REQUIRED, Problems, Table, file_at, nearest
+from lsu_mesh.mesh.keys import NAME_RULE, is_name
+from lsu_mesh.mesh.playback import FileProblems, read_columns
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.orthotope import Orthotope
+
+INPUTS = ("normal", "sine", "zero")
+FAULTS = ("bias", "drift", "stuck", "random", "lost")
+TRANSFERS = ("off",)
+POLICIES = ("intersect",)
+
+
+def read_plant(
+    table: Table | None,
+    model: LSUModel | None,
+    sensors: Mapping[str, SensorSettings],
+    folder: Path,
+    problems: Problems,
+) -> PlantSettings | None:
+    """``[plant]``; needed as soon as one sensor is simulated."""
+    simulated = [sensor.name for sensor in sensors.values() if sensor.file is None]
+    if table is None:
+        if not simulated:
+            return None
+        table = Table({}, "plant", problems)
+    name = table.text("name", "plant")
+    if not is_name(name):
+        table.wrong("name", f'"{name}" is no name; expected {NAME_RULE}')
+    x1 = table.vector("x1", None)
+    if x1 is not None and model is not None and len(x1) != model.state_count:
+        table.wrong("x1", f"expected {model.state_count} numbers, one per state, found {len(x1)}")
+    count = 0 if model is None else model.input_count
+    file = _read_file(table, count, folder, "inputs", "input")
+    inputs = "file" if file is not None else table.choice("inputs", INPUTS, "normal")
+    table.finish()
+    return PlantSettings(name, None if x1 is None else tuple(x1), inputs, file)
+
+
+def read_sensor(table: Table, name: str, states: int | None, folder: Path) -> SensorSettings:
+    """``[sensors.NAME]``."""
+    rows = table.matrix("C")
+    rows = rows if isinstance(rows, list) else [[0.0]]
+    if states is not None and table.values.get("C") and len(rows[0]) != states:
+        table.wrong("C", f"expected {states} columns, one per state, found {len(rows[0])}")
+    widths = table.vector("r")
+    widths = widths if isinstance(widths, list) else [0.0] * len(rows)
+    if len(widths) != len(rows):
+        table.wrong("r", f"expected {len(rows)} half-widths, one per row of C, found {len(widths)}")
+    if any(width < 0 for width in widths):
+        table.wrong("r", f"half-widths must not be negative, found {widths}")
+    default = [name] if len(rows) == 1 else [f"{name}.{i + 1}" for i in range(len(rows))]
+    outputs = table.texts("outputs", default)
+    if len(outputs) != len(rows):
+        table.wrong("outputs", f"expected {len(rows)} names, one per row of C, found {len(outputs)}")
+    source = table.choice("source", ("simulated", "file"), "file" if "file" in table.values else "simulated")
+    file = _read_file(table, len(rows), folder, "file", "row of C") if source == "file" else None
+    if source == "file" and file is None and "file" not in table.values:
+        table.wrong("file", 'is missing; source = "file" needs the path of a CSV file')
+    faults = tuple(_read_fault(item) for item in table.tables("faults"))
+    if faults and source == "file":
+        table.wrong("faults", "faults are simulated, a sensor that plays a file has none; remove the key")
+    table.finish()
+    return SensorSettings(name, tuple(map(tuple, rows)), tuple(widths), tuple(outputs), file, faults)
+
+
+def _read_fault(table: Table) -> SensorFault:
+    kind = table.choice("kind", FAULTS, REQUIRED)
+    first, last = table.whole("from", 1, low=1), table.whole("to", 2**53, low=1)
+    if first > last:
+        table.wrong("to", f"is {last}, before from = {first}")
+    size = table.number("size", 1.0)
+    table.finish()
+    return SensorFault(kind if isinstance(kind, str) else "bias", first, last, size)
+
+
+def _read_file(table: Table, count: int, folder: Path, key: str, per: str) -> MeasurementFileSettings | None:
+    """The keys ``file``, ``columns`` and ``time`` or ``step``; the file itself is read and checked too."""
+    if key == "inputs" and "file" not in table.values:
+        return None
+    text = table.text("file", None)
+    columns = table.texts("columns", None)
+    by_time, by_step = table.text("time", None), table.text("step", None)
+    if text is None:
+        return None
+    if by_time is not None and by_step is not None:
+        table.wrong("step", "give either time or step, the name of the column that orders the rows, not both")
+    index, indexed_by = (by_time, "time") if by_time is not None else (by_step or "step", "step")
+    if columns is not None and len(columns) != count:
+        table.wrong("columns", f"expected {count} column names, one per {per}, found {len(columns)}")
+        columns = None
+    path = file_at(text, folder)
+    settings = MeasurementFileSettings(path, tuple(columns or ()), index, indexed_by)
+    try:
+        header = read_columns(settings, default_count=count).columns
+    except FileProblems as error:
+        table.problems.lines.extend(error.lines)
+        return settings
+    return MeasurementFileSettings(path, header, index, indexed_by)
+
+
+def read_filter(
+    table: Table, name: str, sensors: Mapping[str, SensorSettings], model: LSUModel | None, prior: Orthotope | None
+) -> FilterSettings:
+    """``[filters.NAME]``; the filter is made once, so that the class checks its own options."""
+    kind = table.choice("kind", tuple(FILTERS), REQUIRED)
+    chosen = _read_names(table, "sensors", sensors)
+    deadline = table.duration("deadline", 0.05)
+    history = table.whole("history", 32, low=1, high=4096)
+    transfer = table.choice("transfer", TRANSFERS, "off")
+    reset_after = table.whole("reset_after", 5, low=1)
+    options = table.rest()
+    if isinstance(kind, str) and kind in FILTERS:
+        _check_options(table, kind, options, sensors, chosen, model, prior)
+    return FilterSettings(name, str(kind), chosen, deadline, history, transfer, reset_after, options)
+
+
+def _check_options(
+    table: Table,
+    kind: str,
+    options: Mapping[str, object],
+    sensors: Mapping[str, SensorSettings],
+    chosen: tuple[str, ...],
+    model: LSUModel | None,
+    prior: Orthotope | None,
+) -> None:
+    cls = filter_class(kind)
+    known = [key for key in inspect.signature(cls).parameters if key not in ("model", "prior")]
+    for key in known:
+        table.problems.asked.add(f"{table.path}.{key}")
+    own = ["kind", "sensors", "deadline", "history", "transfer", "reset_after"]
+    unknown = [key for key in options if key not in known]
+    for key in unknown:
+        table.wrong(key, f"unknown key; {nearest(key, [*own, *known])}")
+    if unknown or model is None or prior is None or table.problems.lines:
+        return
+    rows = [row for name in chosen for row in sensors[name].C]
+    widths = [width for name in chosen for width in sensors[name].r]
+    try:
+        cls(model.replace(C=rows, r=widths), prior, **options)  # type: ignore[call-arg]
+    except (ModelError, TypeError) as error:
+        table.problems.add(f"[{table.path}]", str(error))
+
+
+def read_fusion(
+    table: Table, name: str, filters: Mapping[str, FilterSettings], sensors: Mapping[str, SensorSettings]
+) -> FusionSettings:
+    """``[fusion.NAME]``."""
+    sources = _read_names(table, "sources", filters)
+    policy = table.choice("policy", POLICIES, "intersect")
+    faults = table.whole("faults", 0)
+    max_lag = table.whole("max_lag", 16, low=0, high=4096)
+    deadline = table.duration("deadline", 0.05)
+    quarantine_after = table.whole("quarantine_after", 20, low=1)
+    max_generators = table.whole("max_generators", 30, low=1, high=1000)
+    max_constraints = table.whole("max_constraints", 12, low=0, high=500)
+    table.finish()
+    return FusionSettings(
+        name, sources, policy, faults, max_lag, deadline, quarantine_after, max_generators, max_constraints
+    )
+
+
+def _read_names(table: Table, key: str, known: Mapping[str, object]) -> tuple[str, ...]:
+    names = table.texts(key)
+    if not isinstance(names, list):
+        return ()
+    if not names:
+        table.wrong(key, f"is empty; {nearest('', known)}")
+    for name in names:
+        if name not in known:
+            table.wrong(key, f'"{name}" is not defined; {nearest(name, known)}')
+        elif names.count(name) > 1:
+            table.wrong(key, f'"{name}" is named twice')
+    return tuple(sorted({name for name in names if name in known}))

@@ -1,0 +1,49 @@
+"""Key expressions of the mesh: ``lsu/v1/<mesh>/<topic>/<name>``."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+PREFIX = "lsu/v1"
+TOPICS = ("truth", "input", "measurement", "prediction", "posterior", "fused", "health", "event", "live")
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+NAME_RULE = "1 to 64 ASCII letters, digits, '_', '-' or '.', the first a letter or a digit"
+
+
+class Address(NamedTuple):
+    """What a key says: the mesh, the topic and the name of its one publisher."""
+
+    mesh: str
+    topic: str
+    name: str
+
+
+def is_name(text: str) -> bool:
+    """Whether ``text`` may be the name of a mesh or a peer."""
+    return NAME.fullmatch(text) is not None
+
+
+def key(mesh: str, topic: str, name: str) -> str:
+    """Key of one publisher's topic; ``name="**"`` makes the expression for all of them."""
+    if topic not in TOPICS:
+        raise ValueError(f"no topic {topic!r}; topics: {', '.join(TOPICS)}")
+    return f"{PREFIX}/{mesh}/{topic}/{name}"
+
+
+def model_key(mesh: str) -> str:
+    """Key of the query that returns the model."""
+    return f"{PREFIX}/{mesh}/model"
+
+
+def last_key(mesh: str, name: str) -> str:
+    """Key of the query that returns the last sound posterior of the filter ``name``."""
+    return f"{PREFIX}/{mesh}/last/{name}"
+
+
+def parse(text: str) -> Address | None:
+    """The address in a key, or ``None`` when it is no key of this protocol."""
+    chunks = text.split("/")
+    if len(chunks) != 5 or "/".join(chunks[:2]) != PREFIX or chunks[3] not in TOPICS:
+        return None
+    return Address(chunks[2], chunks[3], chunks[4]) if is_name(chunks[2]) and is_name(chunks[4]) else None
