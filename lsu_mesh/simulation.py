@@ -98,9 +98,7 @@ def measure(C: ArrayLike, r: ArrayLike, x: ArrayLike, unit: Vector) -> Vector:
     """``y = C x + r · unit`` (m,), the noise shrunk so that ``|y − C x| ≤ r`` holds in exact arithmetic; C (m, n), r (m,)."""
     rows, state = np.array(C, dtype=np.float64), np.array(x, dtype=np.float64)
     out = np.empty(rows.shape[0])
-    plant.bounded(
-        rows, state, np.zeros((rows.shape[0], 0)), np.zeros(0), unit, np.array(r, dtype=np.float64), out
-    )
+    plant.bounded(rows, state, np.zeros((rows.shape[0], 0)), np.zeros(0), unit, np.array(r, dtype=np.float64), out)
     return out
 
 

@@ -92,9 +92,7 @@ def enclose_orthogonally(T: Matrix, G: Matrix, widths: Vector, delta: Vector, wo
 
 
 @kernel
-def image(
-    c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, new_c: Vector, new_T: Matrix, delta: Vector
-) -> None:
+def image(c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, new_c: Vector, new_T: Matrix, delta: Vector) -> None:
     """``new_c ≈ A c + B u``, ``new_T ≈ A T``; ``delta`` (n,) bounds what rounding has lost in both together."""
     n, p = c.size, u.size
     for i in range(n):
@@ -136,9 +134,7 @@ def predict_image(
 
 
 @kernel
-def update(
-    c: Vector, T: Matrix, C: Matrix, y: Vector, r: Vector, new_c: Vector, new_T: Matrix, work: Matrix
-) -> int:
+def update(c: Vector, T: Matrix, C: Matrix, y: Vector, r: Vector, new_c: Vector, new_T: Matrix, work: Matrix) -> int:
     """Data update: the strips ``|y − C x| ≤ r`` in the order of the rows; NaN is no strip (Lainová et al. 2019, eq. 33).
 
     C (m, n), y (m,), r (m,). Returns 0, ``OVERFLOW``, or k + 1 where the strip of row k is proved to miss the set.
@@ -160,9 +156,7 @@ def update(
 
 
 @kernel
-def meet_box(
-    c: Vector, T: Matrix, lower: Vector, upper: Vector, new_c: Vector, new_T: Matrix, work: Matrix
-) -> int:
+def meet_box(c: Vector, T: Matrix, lower: Vector, upper: Vector, new_c: Vector, new_T: Matrix, work: Matrix) -> int:
     """Offer the faces of a box as strips, each where it cuts. Returns as :func:`update`, k being the coordinate."""
     n = c.size
     last = work.shape[0] - 1
@@ -192,9 +186,27 @@ def _start(c: Vector, T: Matrix, new_c: Vector, new_T: Matrix, delta: Vector) ->
 
 
 @kernel
-def predict_output(
-    c: Vector, T: Matrix, C: Matrix, r: Vector, lower: Vector, upper: Vector, point: Vector
-) -> None:
+def faces(c: Vector, T: Matrix, P: Matrix, y: Vector, r: Vector, factor: Matrix) -> bool:
+    """Strips ``|y − P x| ≤ r`` around the set, ``P ≈ T⁻¹``; ``False`` where T is numerically singular."""
+    n = c.size
+    if not invert(T, P, factor):
+        return False
+    for i in range(n):
+        residual = _residual_row(P, T, i)
+        if not residual <= LARGEST_RESIDUAL:
+            return False
+        s, magnitude = 0.0, 0.0
+        for k in range(n):
+            term = P[i, k] * c[k]
+            s += term
+            magnitude += abs(term)
+        y[i] = s
+        r[i] = up(up(1.0 + residual) + _inflate(gamma(n) * magnitude, n + 4))
+    return True
+
+
+@kernel
+def predict_output(c: Vector, T: Matrix, C: Matrix, r: Vector, lower: Vector, upper: Vector, point: Vector) -> None:
     """Output interval ``C c ± (r + Σ_i |C T_i|)``, rounded outward (Lainová et al. 2019, eqs. 43–45, errata)."""
     n = c.size
     for k in range(C.shape[0]):

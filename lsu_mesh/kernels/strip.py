@@ -97,9 +97,7 @@ def cut(c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, wo
 
 
 @kernel
-def _tighten(
-    g: Vector, low: float, high: float, spread: float, mid: Vector, half: Vector
-) -> tuple[int, float, bool]:
+def _tighten(g: Vector, low: float, high: float, spread: float, mid: Vector, half: Vector) -> tuple[int, float, bool]:
     """Own strips ``ξ_j ∈ mid_j ± half_j`` that ``low ≤ g'ξ ≤ high`` leaves; index and width of the widest; any cut?
 
     The index is −1 where a strip is proved empty.

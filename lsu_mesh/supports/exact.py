@@ -28,10 +28,7 @@ def parallelotope_membership(c: Vector, T: Matrix, x: NDArray | list[Fraction]) 
     x − c lies outside their span.
     """
     used = [j for j in range(T.shape[1]) if T[:, j].any()]
-    rows = [
-        [Fraction(float(T[i, j])) for j in used] + [Fraction(x[i]) - Fraction(float(c[i]))]
-        for i in range(len(c))
-    ]
+    rows = [[Fraction(float(T[i, j])) for j in used] + [Fraction(x[i]) - Fraction(float(c[i]))] for i in range(len(c))]
     rank = _eliminate(rows, len(used))
     if any(row[-1] != 0 for row in rows[rank:]):
         return Membership.OUTSIDE

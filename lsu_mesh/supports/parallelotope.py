@@ -33,6 +33,13 @@ class Parallelotope(Support):
             raise ModelError("a parallelotope needs at least one coordinate")
         self._generators = np.array(finite_array("generators", generators, (n, n)))
 
+    @classmethod
+    def trusted(cls, center: Vector, generators: Matrix) -> Parallelotope:
+        """A parallelotope of arrays that are known to be right and are never written again; nothing is checked."""
+        body = cls.__new__(cls)
+        body._center, body._generators = center, generators
+        return body
+
     @property
     def dim(self) -> int:
         return int(self._center.size)
@@ -97,6 +104,13 @@ class Parallelotope(Support):
         if parallelotope.enclose_along_edges(T, none, np.zeros(0), delta, parallelotope.scratch(n, 0)):
             return Parallelotope(c, T)
         return None
+
+    def strips(self) -> tuple[Matrix, Vector, Vector] | None:
+        """P (n, n), y, r (n,) with ``|y − P x| ≤ r`` for all x of the set, P ≈ T⁻¹; ``None`` where T is numerically singular."""
+        n = self.dim
+        P, y, r = np.empty((n, n)), np.empty(n), np.empty(n)
+        found = parallelotope.faces(self._center, self._generators, P, y, r, np.empty((n, n)))
+        return (P, y, r) if found else None
 
     def minkowski_sum(self, other: Support) -> Support:
         return self.to_zonotope().minkowski_sum(other)

@@ -1,0 +1,115 @@
+"""Checks of what a filter is given at a step, and the arrays that its kernels take."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lsu_mesh.errors import ModelError
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.support import Support
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+class KernelModel(NamedTuple):
+    """A model as kernels take it: writable, contiguous, no ``None``.
+
+    A (n, n), B (n, p), C (m, n), ``G = [N  B]`` (n, q + p) with the columns of everything unknown, rho (q,), r (m,).
+    """
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    G: Matrix
+    rho: Vector
+    r: Vector
+
+
+def kernel_model(model: LSUModel) -> KernelModel:
+    """The arrays of ``model``; the identity stands for a missing noise map, no column for a missing B."""
+    n = model.state_count
+    B = np.zeros((n, 0)) if model.B is None else model.B
+    N = np.eye(n) if model.noise_map is None else model.noise_map
+    return KernelModel(
+        A=np.array(model.A),
+        B=np.array(B),
+        C=np.array(model.C),
+        G=np.ascontiguousarray(np.hstack([N, B])),
+        rho=np.array(model.rho),
+        r=np.array(model.r),
+    )
+
+
+def output_vector(y: ArrayLike, size: int) -> Vector:
+    """y (m,) with NaN for missing entries; ``ModelError`` on a wrong length or an infinite entry."""
+    values = np.array(y, dtype=np.float64)
+    if values.ndim == 0 and size == 1:
+        values = values.reshape(1)
+    if values.shape != (size,):
+        raise ModelError(f"y must have {size} entries, one per output, it has shape {values.shape}")
+    if np.isinf(values).any():
+        raise ModelError(f"y must be finite or NaN (missing), it is {values.tolist()}")
+    return values
+
+
+def half_width_vector(name: str, given: ArrayLike | None, default: Vector) -> Vector:
+    """Half-widths of this step, ``default`` where none are given; a scalar stands for all entries."""
+    if given is None:
+        return default
+    values = np.array(given, dtype=np.float64)
+    if values.ndim == 0:
+        values = np.full(default.size, float(values))
+    if values.shape != default.shape:
+        raise ModelError(f"{name} must have {default.size} entries, it has shape {values.shape}")
+    if not (np.isfinite(values).all() and (values >= 0).all()):
+        raise ModelError(f"{name} must be finite and not negative, it is {values.tolist()}")
+    return values
+
+
+def input_interval(u: ArrayLike | Orthotope | None, size: int) -> tuple[Vector, Vector]:
+    """Centre and half-widths (p,) of the input; a vector has half-widths 0.
+
+    Raises ``ModelError`` where an input is needed and missing, or of wrong length.
+    """
+    if u is None:
+        if size:
+            raise ModelError(f"the model has {size} input(s): give u, or an Orthotope that holds the unknown input")
+        return np.zeros(0), np.zeros(0)
+    if isinstance(u, Orthotope):
+        if u.dim != size:
+            raise ModelError(f"the box of inputs must have {size} coordinates, it has {u.dim}")
+        return np.array(u.center), np.array(u.half_widths)
+    values = np.array(u, dtype=np.float64)
+    if values.ndim == 0 and size == 1:
+        values = values.reshape(1)
+    if values.shape != (size,):
+        raise ModelError(f"u must have {size} entries, one per input, it has shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise ModelError(f"u must be finite (a missing input is an Orthotope), it is {values.tolist()}")
+    return values, np.zeros(size)
+
+
+def same_states(model: LSUModel, step_model: LSUModel | None) -> LSUModel:
+    """The model of this step, which must have as many states as the filter's."""
+    if step_model is None:
+        return model
+    if step_model.state_count != model.state_count:
+        raise ModelError(f"the model of a step must have {model.state_count} states, it has {step_model.state_count}")
+    return step_model
+
+
+def checked_prior(model: LSUModel, prior: Support) -> Support:
+    """The prior, a set in the space of the states.
+
+    Raises ``ModelError`` where it is no set or has another dimension.
+    """
+    if not isinstance(prior, Support):
+        raise ModelError(f"the prior must be a support such as Orthotope(lower, upper), not {type(prior).__name__}")
+    if prior.dim != model.state_count:
+        raise ModelError(f"the prior must have {model.state_count} coordinates, one per state, it has {prior.dim}")
+    return prior
