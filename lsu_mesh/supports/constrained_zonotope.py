@@ -9,7 +9,7 @@ from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.kernels.constrained import meet_sets, meet_strips
 from lsu_mesh.kernels.zonotope import absorb_box, add_centers, zonotope_map, zonotope_radius
 from lsu_mesh.supports.arrays import finite_array, frozen, map_arguments
-from lsu_mesh.supports.linear_programs import is_proved_empty, maximisers, safe_maxima
+from lsu_mesh.supports.linear_programs import is_proved_empty, safe_maxima
 from lsu_mesh.supports.polytope import Polytope, enumerate_polytope
 from lsu_mesh.supports.support import Matrix, Support, Vector
 
@@ -163,7 +163,7 @@ class ConstrainedZonotope(Support):
         A[m:, g + 1 :] = np.eye(2 * n)
         objective = np.zeros((1, g + 1 + 2 * n))
         objective[0, g] = -1.0
-        xi = maximisers(objective, A, np.concatenate([self._b, np.full(2 * n, -0.5)]))[0, :g]
+        xi = safe_maxima(objective, A, np.concatenate([self._b, np.full(2 * n, -0.5)])).points[0, :g]
         return self._center + self._generators @ xi
 
     def _polytope(self) -> Polytope:
@@ -174,7 +174,8 @@ class ConstrainedZonotope(Support):
 
     def _offsets(self, directions: Matrix) -> Matrix:
         """Points ``G ξ`` farthest in the directions (k, n): floating-point answers, for drawing and measuring."""
-        return maximisers(directions @ self._generators, self._A, self._b) @ self._generators.T
+        points = safe_maxima(directions @ self._generators, self._A, self._b).points
+        return points @ self._generators.T
 
     def linear_map(self, R: ArrayLike, shift: ArrayLike | None = None) -> ConstrainedZonotope:
         """``{R c + shift, R G, A, b}`` (P2023 (11)) and the box of its rounding; R (k, n), shift (k,)."""
