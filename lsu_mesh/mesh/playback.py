@@ -45,7 +45,10 @@ class Columns:
 
 @dataclass(frozen=True)
 class Playback:
-    """Values by step: ``values[k]`` belongs to ``steps[k]``, ascending; ``collisions`` rows shared a step and were left out."""
+    """Values by step: ``values[k]`` belongs to ``steps[k]``, ascending.
+
+    ``collisions`` rows shared a step with an earlier row and were left out.
+    """
 
     steps: NDArray[np.int64]
     time_ns: NDArray[np.int64]
@@ -54,8 +57,9 @@ class Playback:
 
 
 def read_playback(settings: MeasurementFileSettings, dt: float, start_time: float | None) -> Playback:
-    """The file's values by step, ``step = round((t − start_time)/dt)`` for a time column; the first row of a step counts.
+    """The file's values by step, ``step = round((t − start_time)/dt)`` for a time column.
 
+    The first row of a step counts.
     Rows before step 1 are left out. Raises :class:`FileProblems`.
     """
     table = read_columns(settings, default_count=len(settings.columns))
@@ -75,7 +79,10 @@ def read_playback(settings: MeasurementFileSettings, dt: float, start_time: floa
 
 
 def read_columns(settings: MeasurementFileSettings, default_count: int) -> Columns:
-    """Read and check a CSV file. Without named columns all but the index column are taken, if they are ``default_count``."""
+    """Read and check a CSV file.
+
+    Without named columns all but the index column are taken, if they are ``default_count``.
+    """
     path = settings.path
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:

@@ -117,7 +117,11 @@ def _read_file(table: Table, count: int, folder: Path, key: str, per: str) -> Me
 
 
 def read_filter(
-    table: Table, name: str, sensors: Mapping[str, SensorSettings], model: LSUModel | None, prior: Orthotope | None
+    table: Table,
+    name: str,
+    sensors: Mapping[str, SensorSettings],
+    model: LSUModel | None,
+    prior: Orthotope | None,
 ) -> FilterSettings:
     """``[filters.NAME]``; the filter is made once, so that the class checks its own options."""
     kind = table.choice("kind", tuple(FILTERS), REQUIRED)

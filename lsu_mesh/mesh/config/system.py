@@ -32,7 +32,10 @@ def read_model(table: Table | None, problems: Problems) -> tuple[LSUModel | None
     if prior is not None and prior.dim != model.state_count:
         problems.add("[model.prior]", f"expected {model.state_count} coordinates, one per state, found {prior.dim}")
     if input_box is not None and input_box.dim != model.input_count:
-        problems.add("[model.input_box]", f"expected {model.input_count} coordinates, one per input, found {input_box.dim}")
+        problems.add(
+            "[model.input_box]",
+            f"expected {model.input_count} coordinates, one per input, found {input_box.dim}",
+        )
     return model, prior, input_box
 
 

@@ -1,0 +1,162 @@
+"""The gate in front of a node: only sound, known and new messages pass, everything else is counted by reason."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection
+
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.messages import (
+    Fused,
+    Input,
+    Measurement,
+    Message,
+    Posterior,
+    Prediction,
+    Refused,
+    Truth,
+    decode,
+)
+
+ROLE_OF_TOPIC = {
+    "truth": "plant",
+    "input": "plant",
+    "measurement": "sensor",
+    "prediction": "filter",
+    "posterior": "filter",
+    "fused": "fusion",
+}
+WINDOW = 4096
+"""How far back in a sequence a message may come late and still be told from a copy."""
+MOST_BOOTS = 16
+
+
+class Sequence:
+    """Which sequence numbers of one (key, boot) have come; bounded memory."""
+
+    def __init__(self, first: int) -> None:
+        self._newest = first - 1
+        self._unseen = set(range(max(0, first - WINDOW), first))
+        self._gaps: set[int] = set()
+
+    def admit(self, seq: int) -> bool:
+        """Whether ``seq`` is new."""
+        if seq > self._newest:
+            self._gaps.update(range(max(self._newest + 1, seq - WINDOW), seq))
+            self._newest = seq
+            if len(self._gaps) > 2 * WINDOW:
+                self._gaps = {gap for gap in self._gaps if gap >= seq - WINDOW}
+            return True
+        if seq in self._gaps:
+            self._gaps.remove(seq)
+            return True
+        if seq in self._unseen:
+            self._unseen.remove(seq)
+            return True
+        return False
+
+    @property
+    def gaps(self) -> int:
+        """How many numbers between the first and the newest are missing now."""
+        return len(self._gaps)
+
+
+class Gate:
+    """Decodes payloads and lets through what this mesh's configuration says may come.
+
+    ``counters`` holds ``received``, ``duplicates``, ``gaps`` and ``refused.<reason>``.
+    """
+
+    def __init__(self, configuration: Configuration, topics: Collection[str]) -> None:
+        self._mesh = configuration.mesh.name
+        self._digest = configuration.digest()
+        self._topics = frozenset(topics)
+        self._states = configuration.base_model.state_count
+        self._inputs = configuration.base_model.input_count
+        self._rows = {name: len(sensor.C) for name, sensor in configuration.sensors.items()}
+        self._names = {
+            "plant": frozenset({configuration.plant.name} if configuration.plant else ()),
+            "sensor": frozenset(configuration.sensors),
+            "filter": frozenset(configuration.filters),
+            "fusion": frozenset(configuration.fusion),
+        }
+        self._sequences: dict[tuple[str, str], Sequence] = {}
+        self.received = 0
+        self.duplicates = 0
+        self.refused: Counter[str] = Counter()
+        self.last_refusal = ""
+
+    def admit(self, key: str, payload: bytes) -> Message | None:
+        """The message, or ``None`` when it is refused or a copy."""
+        try:
+            message = self._checked(key, payload)
+        except Refused as refusal:
+            self.refused[refusal.reason] += 1
+            self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
+            return None
+        if not self._is_new(key, message):
+            self.duplicates += 1
+            return None
+        self.received += 1
+        return message
+
+    @property
+    def gaps(self) -> int:
+        """Messages that are known to exist and have not come."""
+        return sum(sequence.gaps for sequence in self._sequences.values())
+
+    @property
+    def counters(self) -> dict[str, float]:
+        """All counts, for the health message."""
+        counts: dict[str, float] = {
+            "received": self.received,
+            "duplicates": self.duplicates,
+            "gaps": self.gaps,
+        }
+        counts |= {f"refused.{reason}": count for reason, count in sorted(self.refused.items())}
+        return counts
+
+    def _checked(self, key: str, payload: bytes) -> Message:
+        address = parse(key)
+        if address is None or address.mesh != self._mesh or address.topic not in self._topics:
+            raise Refused("key", "not a key that this peer listens to")
+        message = decode(address.topic, payload)
+        role = ROLE_OF_TOPIC.get(address.topic, message.src.partition("/")[0])
+        if message.src != f"{role}/{address.name}":
+            raise Refused("source", f"src is {message.src!r}, the key belongs to {role}/{address.name}")
+        if address.topic in ROLE_OF_TOPIC and address.name not in self._names[role]:
+            raise Refused("unknown", f"the configuration has no {role} {address.name!r}")
+        if message.model != self._digest:
+            raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
+        self._check_shape(address.name, message)
+        return message
+
+    def _check_shape(self, name: str, message: Message) -> None:
+        if isinstance(message, Truth):
+            found, expected = len(message.x), self._states
+        elif isinstance(message, Input):
+            found, expected = len(message.u), self._inputs
+        elif isinstance(message, Measurement):
+            found, expected = len(message.y), self._rows[name]
+        elif isinstance(message, Prediction | Posterior | Fused):
+            found, expected = len(message.lower), self._states
+        else:
+            return
+        if found != expected:
+            raise Refused("shape", f"{found} numbers, expected {expected}")
+        if message.step < 1:
+            raise Refused("step", "steps count from 1")
+
+    def _is_new(self, key: str, message: Message) -> bool:
+        identity = (key, message.boot)
+        sequence = self._sequences.get(identity)
+        if sequence is None:
+            self._forget_old_boots(key)
+            sequence = self._sequences[identity] = Sequence(message.seq)
+        return sequence.admit(message.seq)
+
+    def _forget_old_boots(self, key: str) -> None:
+        known = [identity for identity in self._sequences if identity[0] == key]
+        for identity in known[: max(0, len(known) - MOST_BOOTS + 1)]:
+            del self._sequences[identity]

@@ -1,0 +1,353 @@
+"""The common course of filter and fusion nodes: steps in order, waiting, rewinding, republishing.
+
+At each step the node collects what its sources send, combines it when all have come or the deadline has passed,
+publishes, and predicts with the input. What comes late rewinds to its step. A missing input is never guessed.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.messages import Bounds, Input, Message, Posterior, Reference, SupportMessage
+from lsu_mesh.mesh.nodes.node import SECOND, Node
+from lsu_mesh.mesh.sets import to_message, to_support
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.support import Support, Vector
+
+Base = Reference | Literal["prior", "domain"]
+Status = Literal["ok", "predicted", "inconsistent", "restarted"]
+START_GRACE = SECOND // 2
+"""How long a late joiner listens to the past before it chooses where to start."""
+BEHIND = 32
+"""So many complete steps in the queue and intermediate results are no longer published."""
+
+
+@dataclass
+class Step:
+    """What is known of one step."""
+
+    arrived: dict[str, Message] = field(default_factory=dict)
+    """Newest message of each source."""
+    input: Input | None = None
+    seen: int | None = None
+    """When the first message of the step came."""
+    before: object | None = None
+    """The set before the step's data, for rewinding."""
+    base: Base = "prior"
+    used_before: tuple[Reference, ...] = ()
+    """Base of ``before`` and what was used since."""
+    closed: bool = False
+    """Whether its data were combined once; they are never waited for again."""
+    revision: int = -1
+    published: Posterior | None = None
+
+
+@dataclass(frozen=True)
+class Combined:
+    """Outcome of one step's data."""
+
+    status: Status
+    used: Sequence[Reference]
+    missing: Sequence[str]
+    origin: int | None
+    cause: str | None = None
+
+
+class Estimator(Node):
+    """A node that holds one set per step."""
+
+    def __init__(
+        self, configuration: Configuration, name: str, boot: str, engine: Filter, sources: tuple[str, ...]
+    ) -> None:
+        super().__init__(configuration, name, boot)
+        self.engine = engine
+        self.sources = sources
+        self.epoch = 0
+        self.current: int | None = None
+        self._combined = False
+        """Whether the data of the current step are in the set."""
+        self._steps: dict[int, Step] = {}
+        self._newest = 0
+        self._first_evidence: int | None = None
+        self._candidate: Posterior | None = None
+        self._base: Base = "prior"
+        self._used: tuple[Reference, ...] = ()
+        """Everything used since ``_base``."""
+        self._dirty: int | None = None
+        """Earliest step that has to be done again."""
+        self._waiting = ""
+        self._restarted = False
+        self._counts: dict[str, float] = {
+            "late": 0,
+            "rewinds": 0,
+            "contradictions": 0,
+            "behind": 0,
+            "resets": 0,
+        }
+        self.last_posterior: Posterior | None = None
+        self.absent: set[str] = set()
+        """Sources that are known to be gone and are not waited for."""
+
+    # -- what differs between filter and fusion
+
+    @property
+    @abstractmethod
+    def deadline(self) -> int:
+        """How long to wait for a step's sources after its first sign, in nanoseconds."""
+
+    @property
+    @abstractmethod
+    def history(self) -> int:
+        """How many steps back a late message may rewind."""
+
+    @abstractmethod
+    def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
+        """Bring the step's data into the engine's set; also events."""
+
+    @abstractmethod
+    def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
+        """The message about the set after the data."""
+
+    def prediction(self, k: int, now: int) -> list[Message]:
+        """Messages about the set before the data of step k."""
+        return []
+
+    # -- messages in
+
+    def take(self, source: str, message: Message, now: int) -> None:
+        """Note a source's message for its step; a step that is over will be done again."""
+        step = self._see(message.step, now)
+        if step is None:
+            self._counts["late"] += 1
+            return
+        step.arrived[source] = message
+        if self.current is not None and self._is_over(message.step):
+            self._counts["late"] += 1
+            self._dirty = message.step if self._dirty is None else min(self._dirty, message.step)
+
+    def arrived(self, k: int, source: str) -> Message | None:
+        """What the source has sent for step k, as far as it is remembered."""
+        return self._steps[k].arrived.get(source) if k in self._steps else None
+
+    def take_input(self, message: Input, now: int) -> list[Message]:
+        """Note an input; the first of a step counts."""
+        step = self._see(message.step, now)
+        if step is None:
+            return []
+        if step.input is None:
+            step.input = message
+        elif step.input.u != message.u:
+            about: dict[str, str | int | float | None] = {"source": message.src, "step": message.step}
+            text = f"input of step {message.step} came again from {message.src} with another value; the first counts"
+            return [self.event("WARN", "input-changed", text, now, message.step, about)]
+        return []
+
+    def take_candidate(self, message: Posterior) -> None:
+        """Note a sound set of the mesh from which a late joiner may start."""
+        if message.status in ("ok", "predicted") and (self._candidate is None or message.step > self._candidate.step):
+            self._candidate = message
+
+    def _see(self, k: int, now: int) -> Step | None:
+        """The record of step k, or None when it lies before all that is remembered."""
+        if self.current is not None and k < self.current - self.history:
+            return None
+        if k > self._newest:
+            self._newest = k
+        if self._first_evidence is None:
+            self._first_evidence = now
+        step = self._steps.setdefault(k, Step())
+        if step.seen is None:
+            step.seen = now
+        return step
+
+    def _is_over(self, k: int) -> bool:
+        assert self.current is not None
+        return k < self.current or (k == self.current and self._combined)
+
+    # -- the course of steps
+
+    def advance(self, now: int) -> list[Message]:
+        messages: list[Message] = []
+        if self._dirty is not None:
+            self._rewind(self._dirty)
+            self._dirty = None
+        if self.current is None and not self._start(now):
+            return messages
+        while True:
+            assert self.current is not None
+            k = self.current
+            step = self._steps.setdefault(k, Step())
+            if not self._combined:
+                if not self._is_ready(k, step, now):
+                    break
+                messages += self._close(k, step, now)
+            if not self._predict(k, step, now):
+                break
+            if not self._is_behind():
+                messages += self.prediction(k + 1, now)
+        return messages
+
+    def _is_ready(self, k: int, step: Step, now: int) -> bool:
+        if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
+            return bool(step.closed or step.arrived or self._newest > k)
+        sign = self._first_sign(k)
+        return sign is not None and now >= sign + self.deadline
+
+    def _first_sign(self, k: int) -> int | None:
+        """When the step, or one after it, was first heard of."""
+        seen = [step.seen for j, step in self._steps.items() if j >= k and step.seen is not None]
+        return min(seen) if seen else None
+
+    def wakeup(self) -> int | None:
+        if self.current is None:
+            return None if self._first_evidence is None else self._first_evidence + START_GRACE
+        sign = self._first_sign(self.current)
+        return None if sign is None or self._combined else sign + self.deadline
+
+    def _is_behind(self) -> bool:
+        assert self.current is not None
+        return self._newest - self.current > BEHIND
+
+    def _close(self, k: int, step: Step, now: int) -> list[Message]:
+        """Combine the step's data and publish the result if it is new."""
+        step.before, step.base, step.used_before = self.engine.snapshot(), self._base, self._used
+        combined, messages = self.combine(k, step, now)
+        step.closed = True
+        self._combined = True
+        if self._restarted and combined.status != "inconsistent":
+            combined = replace(combined, status="restarted")
+            self._restarted = False
+        self._used = (*self._used, *combined.used)
+        is_first = step.published is None
+        if is_first and self._is_behind() and combined.status in ("ok", "predicted"):
+            self._counts["behind"] += 1
+            return messages
+        posterior = self._publish(k, step, combined, now)
+        return messages if posterior is None else [*messages, posterior]
+
+    def _publish(self, k: int, step: Step, combined: Combined, now: int) -> Posterior | None:
+        """The posterior's message, or None when the step was published before with the same set."""
+        support, old = to_message(self.engine.support), step.published
+        if old is not None and (old.support, old.status) == (support, combined.status):
+            self._base, self._used = old.reference, ()
+            return None
+        step.revision += 1
+        combined = replace(combined, used=self._used)
+        posterior = step.published = self.posterior(k, step, combined, support, now)
+        self._base, self._used = posterior.reference, ()
+        if posterior.status != "inconsistent":
+            self.last_posterior = posterior
+        return posterior
+
+    def _predict(self, k: int, step: Step, now: int) -> bool:
+        """Time update to step k + 1; False where the input is still missing."""
+        u: Vector | Orthotope | None = None
+        if self.engine.model.input_count:
+            if step.input is not None:
+                u = np.array(step.input.u)
+            elif self.configuration.input_box is not None and now >= (self._first_sign(k) or now) + self.deadline:
+                u = self.configuration.input_box
+            else:
+                self._waiting = f"input of step {k}" if self._newest > k else ""
+                return False
+        elif self._newest <= k:
+            return False
+        self._waiting = ""
+        self.engine.predict(u)
+        if step.input is not None:
+            self._used = (*self._used, step.input.reference)
+        self.current, self._combined = k + 1, False
+        for old in [j for j in self._steps if j < k + 1 - self.history]:
+            del self._steps[old]
+        return True
+
+    def _rewind(self, k: int) -> None:
+        """Return to the set before the data of step k, so that everything since is done again."""
+        step = self._steps.get(k)
+        if step is None or step.before is None:
+            return
+        self._counts["rewinds"] += 1
+        self.engine.restore(step.before)
+        self.current, self._combined = k, False
+        self._base, self._used = step.base, step.used_before
+
+    # -- where to start
+
+    def _start(self, now: int) -> bool:
+        """Choose the first step and the set that surely holds its state."""
+        if self._first_evidence is None:
+            return False
+        first = min(self._steps)
+        if first > 1 and now < self._first_evidence + START_GRACE:
+            return False
+        if (first == 1 and self._start_from_prior(1)) or self._start_from_candidate() or self._start_from_prior(first):
+            return True
+        domain = self.engine.model.domain
+        if domain is not None:
+            self._begin(first, domain, "domain", restarted=True)
+            return True
+        missing = next((j for j in range(1, first + 1) if self._input_missing(j)), first)
+        self._waiting = f"a sound set to start from, or the inputs since step {missing}"
+        return False
+
+    def _start_from_candidate(self) -> bool:
+        candidate = self._candidate
+        if candidate is None or self._input_missing(candidate.step):
+            return False
+        self.epoch = max(self.epoch, candidate.epoch if candidate.src == f"{self.role}/{self.name}" else 0)
+        self._begin(candidate.step, to_support(candidate.support), candidate.reference, restarted=True)
+        return True
+
+    def _start_from_prior(self, first: int) -> bool:
+        if any(self._input_missing(j) for j in range(1, first)):
+            return False
+        self._begin(1, self.configuration.prior, "prior", restarted=False)
+        return True
+
+    def _input_missing(self, k: int) -> bool:
+        if self.engine.model.input_count == 0 or self.configuration.input_box is not None:
+            return False
+        return k not in self._steps or self._steps[k].input is None
+
+    def _begin(self, k: int, support: Support, base: Base, *, restarted: bool) -> None:
+        self.engine.reset(support)
+        self.current, self._combined, self._restarted = k, False, restarted
+        self._base, self._used, self._waiting = base, (), ""
+        for old in [j for j in self._steps if j < k]:
+            del self._steps[old]
+
+    def begin_epoch(self, base: Base) -> None:
+        """Note that the engine now holds a set made from ``base`` alone; what was before is never used again."""
+        self.epoch += 1
+        self._counts["resets"] += 1
+        self._base, self._used, self._restarted = base, (), True
+        for step in self._steps.values():
+            step.before = None
+
+    # -- what is said of the node
+
+    def step(self) -> int:
+        return self.current or 0
+
+    def waiting_for(self) -> str:
+        return self._waiting
+
+    def counters(self) -> dict[str, float]:
+        return self._counts | {"epoch": self.epoch, "newest": self._newest}
+
+    def noise_bounds(self) -> Bounds:
+        """rho and r in force."""
+        return Bounds(rho=self.engine.model.rho.tolist(), r=self.engine.model.r.tolist())
+
+
+def finite_or_none(value: float) -> float | None:
+    """A logarithm of a volume for a message: None for flat sets."""
+    return value if math.isfinite(value) else None

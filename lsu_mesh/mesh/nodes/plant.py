@@ -1,0 +1,100 @@
+"""A simulated plant: publishes the true state and the input of every step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.messages import Input, Message, Truth
+from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.playback import read_playback
+from lsu_mesh.simulation import input_at, next_state, random_uniform
+from lsu_mesh.supports.support import Vector
+
+MOST_AT_ONCE = 64
+"""Steps published in one tick at the most, so that a late plant does not flood the mesh."""
+PAST_INPUTS = 256
+"""Inputs of the past that a plant publishes again when it starts late: filters need every one."""
+
+
+class PlantNode(Node):
+    """``x⁺ = A x + B u + N w`` with noise and inputs that are functions of (seed, name, step).
+
+    A plant that is started again is at the current step at once, with the same values.
+    """
+
+    role = "plant"
+
+    def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
+        super().__init__(configuration, name, boot)
+        assert configuration.plant is not None
+        self._settings = configuration.plant
+        self._schedule = schedule
+        self._model = configuration.base_model
+        self._last = configuration.mesh.steps
+        self._next = 1
+        self._x: Vector = np.array(
+            self._settings.x1 if self._settings.x1 is not None else configuration.prior.center, dtype=np.float64
+        )
+        self._file: dict[int, Vector] | None = None
+        if self._settings.file is not None:
+            played = read_playback(self._settings.file, configuration.mesh.dt, configuration.mesh.start_time)
+            self._file = dict(zip(played.steps.tolist(), played.values, strict=True))
+            end = int(played.steps[-1]) if len(played.steps) else 0
+            self._last = end if self._last is None else min(self._last, end)
+
+    def subscriptions(self) -> Sequence[tuple[str, str]]:
+        return ()
+
+    def receive(self, message: Message, now: int) -> list[Message]:
+        return []
+
+    def advance(self, now: int) -> list[Message]:
+        due = self._schedule.due(now)
+        if self._last is not None:
+            due = min(due, self._last)
+        messages: list[Message] = []
+        if self._next == 1 and due > MOST_AT_ONCE:
+            messages += self._catch_up(due, now)
+        while self._next <= due and len(messages) < 2 * MOST_AT_ONCE:
+            k = self._next
+            messages.append(Truth(**self.stamp("truth", k, now), x=self._x.tolist()))
+            messages += self._drive(k, now, publish=True)
+        return messages
+
+    def _catch_up(self, due: int, now: int) -> list[Message]:
+        """Simulate the past in silence, but for its newest inputs."""
+        messages: list[Message] = []
+        while self._next < due:
+            messages += self._drive(self._next, now, publish=self._next > due - PAST_INPUTS)
+        return messages
+
+    def _drive(self, k: int, now: int, *, publish: bool) -> list[Message]:
+        """One time update of the truth; the input's message."""
+        u = self._input(k)
+        unit = random_uniform(self.configuration.mesh.seed, f"{self.name}/process", k, self._model.rho.size)
+        self._x = next_state(self._model, self._x, u, unit)
+        self._next = k + 1
+        if not publish or not self._model.input_count:
+            return []
+        return [Input(**self.stamp("input", k, now), u=u.tolist())]
+
+    def _input(self, k: int) -> Vector:
+        if self._file is not None:
+            u = self._file.get(k)
+            return np.zeros(self._model.input_count) if u is None or np.isnan(u).any() else u
+        size = self._model.input_count
+        return input_at(self._settings.inputs, self.configuration.mesh.seed, k, size, f"{self.name}/input")
+
+    def wakeup(self) -> int | None:
+        return None if self.finished else self._schedule.time_of(self._next)
+
+    @property
+    def finished(self) -> bool:
+        return self._last is not None and self._next > self._last
+
+    def step(self) -> int:
+        return self._next - 1

@@ -1,0 +1,23 @@
+"""When the steps of a paced source are due."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Step k is due at ``start_ns + (k − 1) · 1e9 / rate``."""
+
+    start_ns: int
+    rate: float
+
+    def due(self, now: int) -> int:
+        """The newest step that is due, 0 before the start."""
+        if now < self.start_ns:
+            return 0
+        return int((now - self.start_ns) * self.rate / 1e9) + 1
+
+    def time_of(self, step: int) -> int:
+        """When a step is due, in nanoseconds."""
+        return self.start_ns + int((step - 1) / self.rate * 1e9)

@@ -1,0 +1,143 @@
+"""Sensors: simulated on the plant's truth, or playing a file of real measurements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from lsu_mesh.mesh.config.settings import Configuration, SensorFault
+from lsu_mesh.mesh.messages import Measurement, Message, Truth
+from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.nodes.plant import MOST_AT_ONCE
+from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.playback import read_playback
+from lsu_mesh.simulation import measure, random_uniform
+from lsu_mesh.supports.support import Vector
+
+
+class SimulatedSensorNode(Node):
+    """``y = C x + v`` with v a function of (seed, name, step), and the faults of its configuration."""
+
+    role = "sensor"
+
+    def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
+        super().__init__(configuration, name, boot)
+        self._settings = configuration.sensors[name]
+        self._step = 0
+        self._done: set[int] = set()
+        self._stuck: dict[SensorFault, Vector] = {}
+
+    def subscriptions(self) -> Sequence[tuple[str, str]]:
+        assert self.configuration.plant is not None
+        return (("truth", self.configuration.plant.name),)
+
+    def receive(self, message: Message, now: int) -> list[Message]:
+        if not isinstance(message, Truth) or message.step in self._done:
+            return []
+        k = message.step
+        self._done.add(k)
+        self._done -= {old for old in self._done if old < k - 4096} if len(self._done) > 8192 else set()
+        self._step = max(self._step, k)
+        unit = random_uniform(self.configuration.mesh.seed, f"{self.name}/noise", k, len(self._settings.r))
+        y = self._distorted(k, measure(self._settings.C, self._settings.r, message.x, unit))
+        mesh = self.configuration.mesh
+        time_ns = max(0, round(((mesh.start_time or 0.0) + k * mesh.dt) * 1e9))
+        return [Measurement(**self.stamp("measurement", k, now), y=listed(y), time_ns=time_ns)]
+
+    def _distorted(self, k: int, y: Vector) -> Vector:
+        for fault in self._settings.faults:
+            if fault.first <= k <= fault.last:
+                y = self._with_fault(fault, k, y)
+        return y
+
+    def _with_fault(self, fault: SensorFault, k: int, y: Vector) -> Vector:
+        if fault.kind == "bias":
+            return y + fault.size
+        if fault.kind == "drift":
+            return y + fault.size * (k - fault.first + 1)
+        if fault.kind == "stuck":
+            return self._stuck.setdefault(fault, y)
+        if fault.kind == "random":
+            noise = random_uniform(self.configuration.mesh.seed, f"{self.name}/fault", k, len(y))
+            return y + fault.size * noise
+        return np.full(len(y), math.nan)  # lost
+
+    def advance(self, now: int) -> list[Message]:
+        return []
+
+    def step(self) -> int:
+        return self._step
+
+
+class FileSensorNode(Node):
+    """Plays recorded measurements by their steps; a step between the first and the last without a row is missing.
+
+    An empty cell is a missing output. Rows that share a step with an earlier row are left out and named in an event.
+    """
+
+    role = "sensor"
+
+    def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
+        super().__init__(configuration, name, boot)
+        settings = configuration.sensors[name]
+        assert settings.file is not None
+        self._schedule = schedule
+        mesh = configuration.mesh
+        self._played = read_playback(settings.file, mesh.dt, mesh.start_time)
+        self._row_of = {int(step): row for row, step in enumerate(self._played.steps)}
+        self._size = len(settings.C)
+        steps = self._played.steps
+        self._next = int(steps[0]) if len(steps) else 1
+        self._last = int(steps[-1]) if len(steps) else 0
+        if mesh.steps is not None:
+            self._last = min(self._last, mesh.steps)
+        self._told_collisions = False
+
+    def subscriptions(self) -> Sequence[tuple[str, str]]:
+        return ()
+
+    def receive(self, message: Message, now: int) -> list[Message]:
+        return []
+
+    def advance(self, now: int) -> list[Message]:
+        messages: list[Message] = []
+        if self._played.collisions and not self._told_collisions:
+            self._told_collisions = True
+            text = (
+                f"{self._played.collisions} row(s) share a step with an earlier row and were left out; "
+                "a smaller dt keeps them"
+            )
+            about: dict[str, str | int | float | None] = {"sensor": self.name, "rows": self._played.collisions}
+            messages.append(self.event("WARN", "rows-share-a-step", text, now, self._next, about))
+        due = min(self._schedule.due(now), self._last)
+        end = min(due, self._next + MOST_AT_ONCE - 1)
+        while self._next <= end:
+            messages.append(self._measurement(self._next, now))
+            self._next += 1
+        return messages
+
+    def _measurement(self, k: int, now: int) -> Measurement:
+        row = self._row_of.get(k)
+        y: list[float | None] = [None] * self._size if row is None else listed(self._played.values[row])
+        time_ns = int(self._played.time_ns[row]) if row is not None else 0
+        if not time_ns:
+            mesh = self.configuration.mesh
+            time_ns = max(0, round(((mesh.start_time or 0.0) + k * mesh.dt) * 1e9))
+        return Measurement(**self.stamp("measurement", k, now), y=y, time_ns=time_ns)
+
+    def wakeup(self) -> int | None:
+        return None if self.finished else self._schedule.time_of(self._next)
+
+    @property
+    def finished(self) -> bool:
+        return self._next > self._last
+
+    def step(self) -> int:
+        return self._next - 1
+
+
+def listed(y: Vector) -> list[float | None]:
+    """Numbers for a message, nil where missing."""
+    return [None if math.isnan(value) else value for value in y.tolist()]

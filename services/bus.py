@@ -1,0 +1,223 @@
+"""The Zenoh session of a peer; the only file that imports zenoh.
+
+Peers with gossip and without multicast; every peer listens somewhere, because peers do not relay for one another.
+Advanced publishers keep a cache and a heartbeat, advanced subscribers recover what they missed; congestion drops (and
+is recovered), it never blocks. Callbacks only stamp the arrival and put into a bounded queue.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import zenoh
+from zenoh import ext
+
+LEASE_MS = 2000
+HEARTBEAT_S = 0.1
+QUEUE_LIMIT = 65536
+
+
+class Arrival(NamedTuple):
+    """Something that came: a ``sample``, or a peer that is ``alive`` or ``gone``."""
+
+    what: str
+    key: str
+    payload: bytes
+    arrival_ns: int
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """How to reach the mesh; ``zenoh`` holds further ``path=value`` settings of Zenoh itself."""
+
+    connect: Sequence[str] = ()
+    listen: Sequence[str] = ("tcp/127.0.0.1:0",)
+    mode: str = "peer"
+    cache: int = 256
+    multicast: bool = False
+    zenoh: Sequence[str] = ()
+
+
+class NoSession(Exception):
+    """The session could not be opened; the message says what to do."""
+
+
+class Clock:
+    """Nanoseconds since 1970 that never go back: the wall clock at the start plus the monotonic clock since."""
+
+    def __init__(self) -> None:
+        self._offset = time.time_ns() - time.monotonic_ns()
+
+    def now(self) -> int:
+        """The time now."""
+        return self._offset + time.monotonic_ns()
+
+
+class Bus:
+    """A session with queued arrivals. Use it as a context manager."""
+
+    def __init__(self, settings: SessionSettings, clock: Clock) -> None:
+        self._settings = settings
+        self._clock = clock
+        self._queue: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        self._publishers: dict[str, Any] = {}
+        self._declared: list[Any] = []
+        self.dropped = 0
+        """Arrivals that found the queue full."""
+        try:
+            self._session = zenoh.open(_zenoh_configuration(settings))
+        except zenoh.ZError as error:
+            raise NoSession(_explained(settings, str(error))) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def publish(self, key: str, payload: bytes, encoding: str) -> None:
+        """Send to everyone who subscribes, now or soon (the cache serves late joiners)."""
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            publisher = self._publishers[key] = self._declare_publisher(key)
+        publisher.put(payload, encoding=encoding)
+
+    def _declare_publisher(self, key: str) -> Any:
+        return ext.declare_advanced_publisher(
+            self._session,
+            key,
+            congestion_control=zenoh.CongestionControl.DROP,
+            allowed_destination=zenoh.Locality.REMOTE,
+            cache=ext.CacheConfig(self._settings.cache),
+            publisher_detection=True,
+            sample_miss_detection=ext.MissDetectionConfig(heartbeat=HEARTBEAT_S, sporadic_heartbeat=None),
+        )
+
+    def subscribe(self, key: str) -> None:
+        """Queue what is and was (as far as caches reach) published under a key expression."""
+        self._declared.append(
+            ext.declare_advanced_subscriber(
+                self._session,
+                key,
+                self._enqueue_sample,
+                history=ext.HistoryConfig(detect_late_publishers=True, max_samples=self._settings.cache),
+                recovery=ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
+            )
+        )
+
+    def _enqueue_sample(self, sample: Any) -> None:
+        self._enqueue(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
+
+    def _enqueue(self, arrival: Arrival) -> None:
+        if self._queue.qsize() >= QUEUE_LIMIT:
+            self.dropped += 1
+            return
+        self._queue.put(arrival)
+
+    def declare_alive(self, key: str) -> None:
+        """Show that this process is there, for as long as it is."""
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def watch_alive(self, key: str) -> None:
+        """Queue who is there and who comes and goes."""
+
+        def changed(sample: Any) -> None:
+            what = "alive" if sample.kind == zenoh.SampleKind.PUT else "gone"
+            self._enqueue(Arrival(what, str(sample.key_expr), b"", self._clock.now()))
+
+        self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
+
+    def ask(self, key: str) -> None:
+        """Query a key; the answers are queued as samples when they come."""
+
+        def answered(reply: Any) -> None:
+            if reply.ok is not None:
+                self._enqueue_sample(reply.ok)
+
+        self._session.get(key, answered, timeout=2.0)
+
+    def answer(self, key: str, answers: Callable[[], tuple[str, bytes, str] | None]) -> None:
+        """Answer queries on ``key`` with ``(key, payload, encoding)``."""
+
+        def reply(query: Any) -> None:
+            with query:
+                found = answers()
+                if found is not None:
+                    query.reply(found[0], found[1], encoding=found[2])
+
+        self._declared.append(self._session.declare_queryable(key, reply))
+
+    def links(self) -> int:
+        """How many peers and routers this session is connected to."""
+        info = self._session.info
+        return len(info.peers_zid()) + len(info.routers_zid())
+
+    def next(self, timeout: float) -> Arrival | None:
+        """The next arrival, or None after ``timeout`` seconds; 0 does not wait."""
+        try:
+            return self._queue.get(timeout=timeout) if timeout > 0 else self._queue.get_nowait()
+        except queue.Empty:
+            return None
+
+    def waiting(self) -> int:
+        """Arrivals in the queue."""
+        return self._queue.qsize()
+
+    def close(self) -> None:
+        """Undeclare everything and close; errors of a lost link do not matter any more."""
+        for declared in [*reversed(self._declared), *self._publishers.values()]:
+            try:
+                declared.undeclare()
+            except zenoh.ZError:
+                continue
+        self._declared.clear()
+        self._publishers.clear()
+        try:
+            self._session.close()
+        except zenoh.ZError:
+            return
+
+
+def _zenoh_configuration(settings: SessionSettings) -> Any:
+    retry = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2}
+    values: dict[str, object] = {
+        "mode": settings.mode,
+        "scouting/multicast/enabled": settings.multicast,
+        "scouting/gossip/enabled": True,
+        "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
+        "connect/endpoints": list(settings.connect),
+        "connect/timeout_ms": -1,
+        "connect/exit_on_failure": False,
+        "connect/retry": retry,
+        "listen/endpoints": list(settings.listen),
+        "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": 500_000,
+        "transport/shared_memory/enabled": False,
+        "timestamping/enabled": True,
+        "adminspace/enabled": True,
+    }
+    configuration = zenoh.Config()
+    for path, value in values.items():
+        configuration.insert_json5(path, json.dumps(value))
+    for item in settings.zenoh:
+        path, _, text = item.partition(":" if ":" in item.partition("=")[0] else "=")
+        configuration.insert_json5(path, text)
+    return configuration
+
+
+def _explained(settings: SessionSettings, error: str) -> str:
+    if "in use" in error.lower() or "listen" in error.lower():
+        listened = ", ".join(settings.listen)
+        return (
+            f"cannot listen on {listened}: {error}\n"
+            'Another process holds the port; stop it, or choose another one with -X network.entry="tcp/127.0.0.1:PORT"'
+        )
+    return f"no Zenoh session: {error}"

@@ -1,0 +1,62 @@
+"""Configuration and session of a command, from its options."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import sys
+from pathlib import Path
+
+from lsu_mesh.mesh.config import Configuration, ConfigurationError, load
+from services.bus import SessionSettings
+
+DEMO = Path(__file__).resolve().parent.parent / "demo.toml"
+CACHED_SECONDS = 6.0
+"""So much of the past a publisher keeps: the lease and a reconnection, with room."""
+
+
+def load_or_explain(file: str | None, options: argparse.Namespace) -> Configuration | None:
+    """The configuration, or None after its mistakes have been printed on stderr."""
+    path = DEMO if file is None else Path(file)
+    try:
+        return load(path, [*flags(options), *options.overrides], os.environ)
+    except ConfigurationError as error:
+        print_problems(error)
+        return None
+
+
+def flags(options: argparse.Namespace) -> list[str]:
+    """The overrides that short flags stand for."""
+    named = {"steps": "mesh.steps", "rate": "mesh.rate", "seed": "mesh.seed"}
+    given = {path: getattr(options, flag, None) for flag, path in named.items()}
+    return [f"{path}={value}" for path, value in given.items() if value is not None]
+
+
+def print_problems(error: ConfigurationError) -> None:
+    """One line per mistake on stderr."""
+    for line in error.problems:
+        print(line, file=sys.stderr)
+    count = len(error.problems)
+    print(f"{count} mistake{'s' if count > 1 else ''}; nothing was started", file=sys.stderr)
+
+
+def session_settings(configuration: Configuration, options: argparse.Namespace) -> SessionSettings:
+    """How a peer of this configuration reaches its mesh: flags first, then ``[network]``."""
+    network = configuration.network
+    connect = options.connect or [network.entry, *network.connect]
+    listen = options.listen or network.listen or ("tcp/127.0.0.1:0",)
+    return SessionSettings(
+        connect=tuple(endpoint for endpoint in connect if endpoint not in listen),
+        listen=tuple(listen),
+        mode=options.mode or "peer",
+        cache=cache_size(configuration),
+        multicast=options.multicast_scouting,
+        zenoh=tuple(options.cfg),
+    )
+
+
+def cache_size(configuration: Configuration) -> int:
+    """Messages per key that a publisher keeps for those who come late."""
+    given = configuration.network.cache
+    return given if given is not None else max(256, math.ceil(CACHED_SECONDS * configuration.mesh.rate))

@@ -1,0 +1,69 @@
+"""``lsu-mesh plant|sensor|filter|fusion|recorder NAME``: run one peer in this process."""
+
+from __future__ import annotations
+
+import argparse
+import secrets
+import sys
+import time
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.config.table import nearest
+from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.nodes.schedule import Schedule
+from services.bus import NoSession
+from services.cli import COULD_NOT_START, USAGE
+from services.commands.configuration import load_or_explain, session_settings
+
+
+def main(options: argparse.Namespace) -> int:
+    configuration = load_or_explain(options.config, options)
+    if configuration is None:
+        return USAGE
+    known = [name for role, name in configuration.peers() if role == options.role]
+    if options.name not in known:
+        print(
+            f"{configuration.path}: there is no {options.role} {options.name!r}; {nearest(options.name, known)}",
+            file=sys.stderr,
+        )
+        return USAGE
+    try:
+        return _run(configuration, options)
+    except NoSession as error:
+        print(error, file=sys.stderr)
+        return COULD_NOT_START
+
+
+def _run(configuration: Configuration, options: argparse.Namespace) -> int:
+    settings = session_settings(configuration, options)
+    if options.role == "recorder":
+        from services.recorder import run_recorder
+
+        return run_recorder(configuration, options.record, settings)
+    from services.peer import run_node
+
+    return run_node(make_node(configuration, options), settings)
+
+
+def make_node(configuration: Configuration, options: argparse.Namespace) -> Node:
+    """The node of a role and name."""
+    name, boot = options.name, secrets.token_hex(8)
+    if options.role in ("plant", "sensor"):
+        start = options.start_at if options.start_at is not None else time.time_ns()
+        schedule = Schedule(start, configuration.mesh.rate)
+        if options.role == "plant":
+            from lsu_mesh.mesh.nodes.plant import PlantNode
+
+            return PlantNode(configuration, name, boot, schedule)
+        from lsu_mesh.mesh.nodes.sensor import FileSensorNode, SimulatedSensorNode
+
+        if configuration.sensors[name].file is not None:
+            return FileSensorNode(configuration, name, boot, schedule)
+        return SimulatedSensorNode(configuration, name, boot)
+    if options.role == "filter":
+        from lsu_mesh.mesh.nodes.filter import FilterNode
+
+        return FilterNode(configuration, name, boot)
+    from lsu_mesh.mesh.nodes.fusion import FusionNode
+
+    return FusionNode(configuration, name, boot)

@@ -1,0 +1,249 @@
+"""``lsu-mesh run``: a whole mesh as processes, with progress, a table, and the line that opens the recording."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.keys import PREFIX, key, parse
+from lsu_mesh.mesh.playback import read_playback
+from services.bus import Arrival, Bus, Clock, NoSession, SessionSettings
+from services.cli import COULD_NOT_START, FAILURE, OK, USAGE
+from services.commands.configuration import DEMO, cache_size, flags, load_or_explain
+from services.peer import Stop
+from services.report import RunReport
+from services.supervisor import Supervisor
+from services.table import Progress, print_json, print_table
+
+READY_S = 60.0
+"""How long the peers may take to start; the first start on a machine compiles the kernels."""
+START_LEAD_S = 1.0
+QUIET_S = 4.0
+"""The run is over when the sources have ended and nothing new has come for so long."""
+
+
+@dataclass
+class Run:
+    """One run of a mesh under the supervisor."""
+
+    configuration: Configuration
+    options: argparse.Namespace
+    supervisor: Supervisor
+    bus: Bus
+    clock: Clock
+    stop: Stop
+    report: RunReport
+    recording: Path | None
+    alive: set[str] = field(default_factory=set)
+    happened: list[str] = field(default_factory=list)
+    began: float = field(default_factory=time.monotonic)
+    stopping: bool = False
+
+    def note(self, words: str) -> None:
+        """Remember what happened and when, for the table."""
+        self.happened.append(f"{time.monotonic() - self.began:7.2f} s  {words}")
+
+    def turn(self, timeout: float = 0.05) -> None:
+        """Take what has come and look after the children."""
+        arrival = self.bus.next(timeout)
+        while arrival is not None:
+            self._take(arrival)
+            arrival = self.bus.next(0)
+        for child, words in self.supervisor.watch(time.monotonic()):
+            self.note(words)
+            if child.process is not None and child.process.poll() is not None and child.words:
+                self.note(f"last words of {child.label}:\n{child.last_words()}")
+
+    def _take(self, arrival: Arrival) -> None:
+        if arrival.what == "sample":
+            self.report.deliver(arrival.key, arrival.payload, arrival.arrival_ns)
+            return
+        address = parse(arrival.key)
+        if address is None:
+            return
+        if arrival.what == "alive":
+            self.alive.add(address.name)
+        elif address.name in self.alive:
+            self.alive.discard(address.name)
+            if not self.stopping:
+                self.note(f"{address.name} left the mesh")
+
+
+def main(options: argparse.Namespace) -> int:
+    configuration = load_or_explain(options.file, options)
+    if configuration is None:
+        return USAGE
+    stop = Stop()
+    clock = Clock()
+    network = configuration.network
+    settings = SessionSettings(
+        connect=network.connect, listen=(network.entry, *network.listen), cache=cache_size(configuration)
+    )
+    try:
+        with Bus(settings, clock) as bus:
+            recording = None if options.no_record else _recording_path(configuration, options)
+            supervisor = Supervisor(configuration.supervisor)
+            run = Run(configuration, options, supervisor, bus, clock, stop, RunReport(configuration), recording)
+            return _supervise(run)
+    except NoSession as error:
+        print(error, file=sys.stderr)
+        return COULD_NOT_START
+
+
+def _recording_path(configuration: Configuration, options: argparse.Namespace) -> Path:
+    template = options.record or configuration.recorder.path
+    moment = time.strftime("%Y%m%d-%H%M%S")
+    return Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
+
+
+def _supervise(run: Run) -> int:
+    for topic in ("truth", "posterior", "fused", "health", "event"):
+        run.bus.subscribe(f"{PREFIX}/{run.configuration.mesh.name}/{topic}/*")
+    run.bus.watch_alive(key(run.configuration.mesh.name, "live", "*"))
+    try:
+        code = _start(run)
+        if code == OK:
+            _follow(run)
+    finally:
+        run.stopping = True
+        complaints = run.supervisor.stop()
+        run.supervisor.kill()
+    run.happened += complaints
+    if code != OK:
+        for words in run.happened:
+            print(words, file=sys.stderr)
+        return code
+    _settle(run)
+    return _sum_up(run)
+
+
+def _start(run: Run) -> int:
+    """Start everyone who listens, wait until they are there, then the sources."""
+    _compile_kernels(run)
+    sources = {name for role, name in run.configuration.peers() if _is_source(run.configuration, role, name)}
+    listeners = [peer for peer in run.configuration.peers() if peer[1] not in sources]
+    if run.recording is None:
+        listeners = [peer for peer in listeners if peer[0] != "recorder"]
+    shared = _shared_arguments(run)
+    for role, name in listeners:
+        extra = ["--record", str(run.recording)] if role == "recorder" else []
+        run.supervisor.start(role, name, [*shared, *extra])
+    if not _await_alive(run, {name for _, name in listeners}):
+        return COULD_NOT_START
+    start_at = run.clock.now() + int(START_LEAD_S * 1e9)
+    for role, name in run.configuration.peers():
+        if name in sources:
+            run.supervisor.start(role, name, [*shared, "--start-at", str(start_at)])
+    return OK
+
+
+def _compile_kernels(run: Run) -> None:
+    """Compile once here, so that the children only load."""
+    from lsu_mesh.kernels.warm_up import warm_up
+
+    warm_up()
+
+
+def _is_source(configuration: Configuration, role: str, name: str) -> bool:
+    return role == "plant" or (role == "sensor" and configuration.sensors[name].file is not None)
+
+
+def _shared_arguments(run: Run) -> list[str]:
+    file = run.options.file if run.options.file is not None else str(DEMO)
+    overrides = [*flags(run.options), *run.options.overrides]
+    network = run.configuration.network
+    arguments = ["-c", file, "-e", network.entry]
+    for override in overrides:
+        arguments += ["-X", override]
+    return arguments
+
+
+def _await_alive(run: Run, names: set[str]) -> bool:
+    end = time.monotonic() + READY_S
+    while not names <= run.alive:
+        run.turn()
+        if run.stop:
+            run.note("stopped before the mesh was up")
+            return False
+        failed = [child for child in run.supervisor.children if child.given_up or child.restarts]
+        if failed or time.monotonic() > end:
+            missing = ", ".join(sorted(names - run.alive))
+            run.note(f"the mesh did not come up; not there: {missing}")
+            return False
+    return True
+
+
+def _follow(run: Run) -> None:
+    """Until the last step has been reached everywhere, the sources have ended, or someone says stop."""
+    last = _last_step(run.configuration)
+    newest, changed = 0, time.monotonic()
+    with Progress(last, shown=not run.options.json) as progress:
+        while not run.stop:
+            run.turn()
+            reached = run.report.progress()
+            progress.show(reached)
+            if reached > newest:
+                newest, changed = reached, time.monotonic()
+            if last is not None and run.report.last_step() >= last:
+                return
+            if time.monotonic() - changed > QUIET_S and _sources_ended(run, last):
+                run.note(f"nothing new for {QUIET_S:g} s after the sources ended at step {last}")
+                return
+
+
+def _sources_ended(run: Run, last: int | None) -> bool:
+    steps = run.report.source_steps
+    return last is not None and bool(steps) and max(steps.values()) >= last
+
+
+def _last_step(configuration: Configuration) -> int | None:
+    ends = [] if configuration.mesh.steps is None else [configuration.mesh.steps]
+    mesh = configuration.mesh
+    files = [sensor.file for sensor in configuration.sensors.values() if sensor.file is not None]
+    if files:
+        ends.append(max(int(read_playback(file, mesh.dt, mesh.start_time).steps[-1]) for file in files))
+    return min(ends) if ends else None
+
+
+def _settle(run: Run) -> None:
+    """Take what was still under way."""
+    end = time.monotonic() + 0.3
+    while time.monotonic() < end:
+        arrival = run.bus.next(0.05)
+        if arrival is not None and arrival.what == "sample":
+            run.report.deliver(arrival.key, arrival.payload, arrival.arrival_ns)
+
+
+def _sum_up(run: Run) -> int:
+    restarts = {child.name: child.restarts for child in run.supervisor.children}
+    rows = run.report.rows(restarts)
+    opening = _opening_line(run.recording)
+    if run.options.json:
+        print_json(rows, run.happened, run.report.events, run.recording)
+    else:
+        print_table(rows, run.happened, run.report.events, opening)
+    gave_up = [child.label for child in run.supervisor.children if child.given_up]
+    nothing = not any(row.steps for row in rows)
+    if nothing:
+        print("no estimate was published", file=sys.stderr)
+    return FAILURE if gave_up or nothing else OK
+
+
+def _opening_line(recording: Path | None) -> str:
+    if recording is None:
+        return ""
+    program: Sequence[str] = [sys.argv[0]] if sys.argv[0].endswith("lsu-mesh") else [sys.executable, "-m", "services"]
+    return " ".join([_relative(program[0]), *program[1:], "view", str(recording)])
+
+
+def _relative(program: str) -> str:
+    path = Path(program)
+    try:
+        return str(path.absolute().relative_to(Path.cwd()))
+    except ValueError:
+        return program

@@ -1,0 +1,168 @@
+"""One peer: a node of the mesh with its session, its queue and its clock."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterable
+from types import FrameType
+
+from lsu_mesh.mesh.keys import key, last_key, model_key, parse
+from lsu_mesh.mesh.messages import Message, encode, encoding
+from lsu_mesh.mesh.nodes.estimator import Estimator
+from lsu_mesh.mesh.nodes.filter import FilterNode
+from lsu_mesh.mesh.nodes.fusion import FusionNode
+from lsu_mesh.mesh.nodes.node import Node
+from services.bus import Arrival, Bus, Clock, SessionSettings
+
+LONGEST_WAIT = 0.1
+"""Seconds between looks at the stop flag and the parent."""
+
+
+class Stop:
+    """Set by the first SIGINT or SIGTERM; the second SIGINT ends the process at once with code 130."""
+
+    def __init__(self) -> None:
+        self.is_set = False
+        self._interrupts = 0
+        self._parent = int(os.environ.get("LSU_MESH_PARENT", "0"))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._handle)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        self.is_set = True
+        if number == signal.SIGINT:
+            self._interrupts += 1
+            if self._interrupts > 1:
+                os._exit(130)
+
+    def is_orphan(self) -> bool:
+        """Whether the supervisor that started this process is gone."""
+        return self._parent != 0 and os.getppid() != self._parent
+
+    def __bool__(self) -> bool:
+        return self.is_set or self.is_orphan()
+
+
+def run_node(node: Node, settings: SessionSettings) -> int:
+    """Run a node until it is told to stop; returns the exit code."""
+    stop, clock = Stop(), Clock()
+    with Bus(settings, clock) as bus:
+        peer = Peer(node, bus, clock)
+        peer.declare()
+        said_finished = False
+        while not stop:
+            peer.turn()
+            if node.finished and not said_finished:
+                said_finished = True
+                print(
+                    f"{node.role} {node.name}: all steps are published; serving late joiners until stopped",
+                    file=sys.stderr,
+                )
+    return 0
+
+
+class Peer:
+    """The loop around a node: drain the queue, tick, publish."""
+
+    def __init__(self, node: Node, bus: Bus, clock: Clock) -> None:
+        self._node = node
+        self._bus = bus
+        self._clock = clock
+        self._mesh = node.configuration.mesh.name
+
+    def declare(self) -> None:
+        """Subscriptions, the liveliness token, queries and answers."""
+        for topic, name in self._node.subscriptions():
+            self._bus.subscribe(key(self._mesh, topic, name))
+        self._bus.watch_alive(key(self._mesh, "live", "*"))
+        self._bus.declare_alive(key(self._mesh, "live", self._node.name))
+        if isinstance(self._node, FilterNode):
+            self._bus.ask(last_key(self._mesh, self._node.name))
+        if isinstance(self._node, FusionNode):
+            for name in self._node.sources:
+                self._answer_last(self._node, name)
+        if isinstance(self._node, Estimator):
+            self._answer_latest(self._node)
+
+    def _answer_last(self, node: FusionNode, name: str) -> None:
+        def answers() -> tuple[str, bytes, str] | None:
+            last = node.last.get(name)
+            if last is None:
+                return None
+            return last_key(self._mesh, name), encode(last), encoding(last.topic)
+
+        self._bus.answer(last_key(self._mesh, name), answers)
+
+    def _answer_latest(self, node: Estimator) -> None:
+        topic = "fused" if isinstance(node, FusionNode) else "posterior"
+        own_key = key(self._mesh, topic, node.name)
+
+        def latest() -> tuple[str, bytes, str] | None:
+            last = node.last_posterior
+            return None if last is None else (own_key, encode(last), encoding(last.topic))
+
+        self._bus.answer(own_key, latest)
+        if topic == "fused" or not node.configuration.fusion:
+            payload = encode_model(node)
+            self._bus.answer(model_key(self._mesh), lambda: (model_key(self._mesh), payload, "application/msgpack"))
+
+    def turn(self) -> None:
+        """Wait for something to do, then do all of it."""
+        arrival = self._bus.next(self._patience())
+        while arrival is not None:
+            self._publish(self._take(arrival))
+            arrival = self._bus.next(0)
+        self._publish(self._node.tick(self._clock.now()))
+
+    def _patience(self) -> float:
+        wakeup = self._node.wakeup()
+        if wakeup is None:
+            return LONGEST_WAIT
+        return min(LONGEST_WAIT, max(0.0005, (wakeup - self._clock.now()) * 1e-9))
+
+    def _take(self, arrival: Arrival) -> list[Message]:
+        if arrival.what == "sample":
+            return self._node.deliver(self._canonical(arrival.key), arrival.payload, arrival.arrival_ns)
+        address = parse(arrival.key)
+        if address is not None and isinstance(self._node, Estimator) and address.name in self._node.sources:
+            if arrival.what == "gone":
+                self._node.absent.add(address.name)
+            else:
+                self._node.absent.discard(address.name)
+        return []
+
+    def _canonical(self, sample_key: str) -> str:
+        """Answers to ``last/NAME`` are posteriors of NAME."""
+        if sample_key == last_key(self._mesh, self._node.name):
+            return key(self._mesh, "posterior", self._node.name)
+        return sample_key
+
+    def _publish(self, messages: Iterable[Message]) -> None:
+        for message in messages:
+            self._bus.publish(self._node.key(message), encode(message), encoding(message.topic))
+
+
+def encode_model(node: Node) -> bytes:
+    """The model as a MessagePack map: A, B, C by sensor, rho, r by sensor, noise_map, names, dt, digest."""
+    import msgspec
+
+    configuration = node.configuration
+    model = configuration.base_model
+    content = {
+        "v": 1,
+        "model": configuration.digest(),
+        "dt": configuration.mesh.dt,
+        "A": model.A.tolist(),
+        "B": None if model.B is None else model.B.tolist(),
+        "noise_map": None if model.noise_map is None else model.noise_map.tolist(),
+        "rho": model.rho.tolist(),
+        "states": list(model.states),
+        "units": list(model.units),
+        "sensors": {
+            name: {"C": [list(row) for row in sensor.C], "r": list(sensor.r), "outputs": list(sensor.outputs)}
+            for name, sensor in configuration.sensors.items()
+        },
+    }
+    return msgspec.msgpack.encode(content)
