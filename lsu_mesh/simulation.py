@@ -1,7 +1,7 @@
 """A seeded plant with bounded noise.
 
-Every random value is a function of ``(seed, name, step)`` (counter-based generator Philox), so that a plant or a sensor that
-starts again, or starts late, is at the current step at once and draws the same values.
+Every random value is a function of ``(seed, name, step)`` (counter-based generator Philox), so that a plant or a sensor
+that starts again, or starts late, is at the current step at once and draws the same values.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SINE_PERIOD = 100
 
 
 class Simulation(NamedTuple):
-    """States X (T, n), outputs Y (T, m) and inputs U (T, p) of steps 1 … T; row k is step k + 1, U[k] drives k → k + 1."""
+    """States X (T, n), outputs Y (T, m), inputs U (T, p) of steps 1 … T; row k is step k + 1, U[k] drives it on."""
 
     X: Matrix
     Y: Matrix
@@ -79,8 +79,8 @@ def next_state(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vec
     """``x⁺ = A x + B u + N (rho · unit)``, x (n,), u (p,), ``|unit| ≤ 1`` (q,).
 
     Without a noise map the noise is shrunk by the rounding of this very step, so that the stored x⁺ fulfils
-    ``|x⁺ − A x − B u| ≤ rho`` in exact arithmetic; where rho is below the rounding, or with a noise map, x⁺ is off by that
-    rounding, which every filter's own outward rounding covers.
+    ``|x⁺ − A x − B u| ≤ rho`` in exact arithmetic; where rho is below the rounding, or with a noise map, x⁺ is off by
+    that rounding, which every filter's own outward rounding covers.
     """
     n = model.state_count
     out = np.empty(n)
@@ -95,7 +95,7 @@ def next_state(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vec
 
 
 def measure(C: ArrayLike, r: ArrayLike, x: ArrayLike, unit: Vector) -> Vector:
-    """``y = C x + r · unit`` (m,), the noise shrunk so that ``|y − C x| ≤ r`` holds in exact arithmetic; C (m, n), r (m,)."""
+    """``y = C x + r · unit`` (m,), the noise shrunk so that ``|y − C x| ≤ r`` holds exactly; C (m, n), r (m,)."""
     rows, state = np.array(C, dtype=np.float64), np.array(x, dtype=np.float64)
     out = np.empty(rows.shape[0])
     plant.bounded(rows, state, np.zeros((rows.shape[0], 0)), np.zeros(0), unit, np.array(r, dtype=np.float64), out)
@@ -112,8 +112,8 @@ def simulate(
 ) -> Simulation:
     """Simulate ``steps`` steps from x1 (n,), 0 by default.
 
-    ``inputs``: see :func:`input_at`, or an array (steps, p). ``noise``: ``"uniform"``, or ``"corners"`` for the extreme values only.
-    The stored numbers fulfil the declared bounds in exact arithmetic (see :func:`next_state` for the exceptions).
+    ``inputs``: see :func:`input_at`, or an array (steps, p). ``noise``: ``"uniform"``, or ``"corners"`` for the extreme
+    values only. The stored numbers fulfil the declared bounds in exact arithmetic (see :func:`next_state` for the exceptions).
     """
     n, m, p, q = model.state_count, model.output_count, model.input_count, model.rho.size
     X, Y = np.empty((steps, n)), np.empty((steps, m))

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.arguments import (
-    KernelModel,
     checked_prior,
     half_width_vector,
     input_interval,
@@ -20,55 +19,42 @@ from lsu_mesh.filters.arguments import (
     same_states,
 )
 from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.kernels import step
+from lsu_mesh.kernels.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-State = tuple[NDArray[np.float64], ...]
 
 
 class CompiledFilter(Filter):
-    """A filter whose state is a tuple of arrays and whose steps are kernels ``(state, …) → (new state, status)``.
+    """A filter whose steps are those of ``kernels/step.py`` for its ``family`` and ``option``.
 
-    A status is 0, negative for overflow, or 1 + the index of the strip (or coordinate) that is proved to miss the set. Arrays of
-    a state are never written again, so that a snapshot is the tuple itself.
+    The state is a matrix with rows of length n. It is never written again once it is in force, so that a snapshot is the
+    matrix itself.
     """
 
-    def __init__(self, model: LSUModel, prior: Support) -> None:
+    family: ClassVar[int]
+    option: int
+
+    def __init__(self, model: LSUModel, prior: Support, option: int) -> None:
+        self.option = option
         self._model = model
         self._arrays = kernel_model(model)
-        self._work = self._scratch()
+        self._work = self._scratch(self._arrays.G.shape[1])
         self._state = self._enclose(checked_prior(model, prior))
 
+    @staticmethod
     @abstractmethod
-    def _scratch(self) -> Matrix:
-        """Scratch memory of the kernels."""
+    def _enclose(support: Support) -> Matrix:
+        """The state that holds ``support``."""
 
+    @staticmethod
     @abstractmethod
-    def _enclose(self, support: Support) -> State:
-        """The smallest state at hand that holds ``support``."""
-
-    @abstractmethod
-    def _make_support(self, state: State) -> Support:
+    def _make_support(state: Matrix) -> Support:
         """The set that a state stands for."""
-
-    @abstractmethod
-    def _update(self, state: State, C: Matrix, y: Vector, r: Vector) -> tuple[State, int]:
-        """Data update with the strips ``|y − C x| ≤ r``."""
-
-    @abstractmethod
-    def _predict(self, state: State, arrays: KernelModel, u: Vector, widths: Vector) -> tuple[State, int]:
-        """Time update; ``widths`` belong to the columns of ``arrays.G``."""
-
-    @abstractmethod
-    def _meet_box(self, state: State, lower: Vector, upper: Vector) -> tuple[State, int]:
-        """Keep the part of the set in a box."""
-
-    @abstractmethod
-    def _predict_output(self, state: State, r: Vector) -> OutputPrediction:
-        """Interval of ``C x + v``."""
 
     @property
     def model(self) -> LSUModel:
@@ -78,13 +64,24 @@ class CompiledFilter(Filter):
     def support(self) -> Support:
         return self._make_support(self._state)
 
+    @property
+    def point(self) -> Vector:
+        return self._describe(self._state)[0]
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        _, lower, upper, _ = self._describe(self._state)
+        return lower, upper
+
+    def volume(self) -> float:
+        return self._describe(self._state)[3]
+
     def predict_output(self) -> OutputPrediction:
-        return self._predict_output(self._state, self._arrays.r)
+        return self._predict_output(self._arrays.r)
 
     def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Support:
         values = output_vector(y, self._model.output_count)
         widths = half_width_vector("r", r, self._arrays.r)
-        state, status = self._update(self._state, self._arrays.C, values, widths)
+        state, status = self._cut(self._state, self._arrays.C, values, widths)
         if status > 0:
             raise self._contradiction(values, widths, status)
         self._accept(state, status)
@@ -100,32 +97,31 @@ class CompiledFilter(Filter):
         arrays = self._arrays if model is None else kernel_model(step_model)
         center, half_widths = input_interval(u, step_model.input_count)
         widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
-        state, status = self._predict(self._state, arrays, center, widths)
+        work = self._work if widths.size == self._arrays.G.shape[1] else self._scratch(widths.size)
+        state = np.empty_like(self._state)
+        status = step.predict(
+            self.family, self.option, self._state, arrays.A, arrays.B, center, arrays.G, widths, state, work
+        )
         if status == 0 and step_model.domain is not None:
-            state, status = self._meet_box(state, *_writable(step_model.domain.bounds()))
+            state, status = self._meet_box(state, step_model.domain)
             if status > 0:
-                raise InconsistentData(f"the prediction misses the domain in state {self._model.states[status - 1]}")
+                name = self._model.states[status - 1]
+                raise InconsistentData(f"the prediction misses the domain in state {name}")
         self._accept(state, status)
         return self.support
 
     def condition(self, support: Support) -> float:
         if support.dim != self._model.state_count:
             raise ModelError(f"the set must have {self._model.state_count} coordinates, it has {support.dim}")
-        before = self.support.log_volume()
-        state = self._condition(self._state, support)
-        after = self._make_support(state).log_volume()
-        self._accept(state, 0)
-        return max(0.0, before - after) if before > -math.inf else 0.0
-
-    def _condition(self, state: State, support: Support) -> State:
-        """The part of the set in ``support``: its interval hull first, then the faces of its parallelotopes."""
-        state, status = self._meet_box(state, *_writable(support.bounds()))
+        before = self._log_volume(self._state)
+        state, status = self._meet_box(self._state, support.interval_hull())
         for P, y, r in faces(support):
             if status == 0:
-                state, status = self._update(state, P, y, r)
+                state, status = self._cut(state, P, y, r)
         if status > 0:
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
-        return state
+        self._accept(state, status)
+        return max(0.0, before - self._log_volume(state)) if before > -math.inf else 0.0
 
     def reset(self, support: Support) -> None:
         self._state = self._enclose(checked_prior(self._model, support))
@@ -134,23 +130,47 @@ class CompiledFilter(Filter):
         return self._state
 
     def restore(self, snapshot: object) -> None:
-        self._state = cast("State", snapshot)
+        self._state = cast("Matrix", snapshot)
 
-    def _accept(self, state: State, status: int) -> None:
+    def _scratch(self, noise_columns: int) -> Scratch:
+        return scratch(self._model.state_count, noise_columns)
+
+    def _cut(self, state: Matrix, C: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
+        new = np.empty_like(state)
+        return new, step.update(self.family, self.option, state, C, y, r, new, self._work)
+
+    def _meet_box(self, state: Matrix, box: Orthotope) -> tuple[Matrix, int]:
+        new = np.empty_like(state)
+        lower, upper = np.array(box.lower), np.array(box.upper)
+        return new, step.meet_box(self.family, state, lower, upper, new, self._work)
+
+    def _describe(self, state: Matrix) -> tuple[Vector, Vector, Vector, float]:
+        n = self._model.state_count
+        point, lower, upper = np.empty(n), np.empty(n), np.empty(n)
+        return point, lower, upper, step.describe(self.family, state, point, lower, upper, self._work)
+
+    def _log_volume(self, state: Matrix) -> float:
+        return step.log_volume(self.family, state, self._work)
+
+    def _predict_output(self, r: Vector) -> OutputPrediction:
+        lower, upper, point = np.empty(r.size), np.empty(r.size), np.empty(r.size)
+        step.predict_output(self.family, self._state, self._arrays.C, r, lower, upper, point, self._work)
+        return OutputPrediction(lower, upper, point)
+
+    def _accept(self, state: Matrix, status: int) -> None:
         if status < 0:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
         self._state = state
 
     def _contradiction(self, y: Vector, r: Vector, status: int) -> InconsistentData:
         """Name the strips that alone miss the set, else all strips up to the one that proved the contradiction."""
-        interval = self._predict_output(self._state, r)
-        gaps = np.maximum(interval.lower - y, y - interval.upper)
+        interval = self._predict_output(r)
+        gaps = np.fmax(interval.lower - y, y - interval.upper)
         alone = [int(k) for k in np.flatnonzero(gaps > 0)]
         names = self._model.outputs
         if alone:
-            gap = float(gaps[alone[0]])
             listed = ", ".join(f"{names[k]} (by {gaps[k]:.3g})" for k in alone)
-            return InconsistentData(f"outside its predicted interval: {listed}", alone, gap)
+            return InconsistentData(f"outside its predicted interval: {listed}", alone, float(gaps[alone[0]]))
         rows = [k for k in range(status) if not math.isnan(y[k])]
         listed = ", ".join(names[k] for k in rows)
         return InconsistentData(f"the strips of {listed} and the prediction have no point in common", rows)
@@ -164,7 +184,3 @@ def faces(support: Support) -> list[tuple[Matrix, Vector, Vector]]:
         strips = support.strips()
         return [] if strips is None else [strips]
     return [strips for part in getattr(support, "parts", ()) for strips in faces(part)]
-
-
-def _writable(bounds: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
-    return np.array(bounds[0]), np.array(bounds[1])

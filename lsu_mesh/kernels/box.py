@@ -9,25 +9,17 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
-from lsu_mesh.kernels.strip import EMPTY, UNCHANGED, cut, half_width, hull, middle
+from lsu_mesh.kernels.scratch import BODY, BOX, DELTA, STRIP, Scratch
+from lsu_mesh.kernels.strip import EMPTY, OVERFLOW, STRIP_ROWS, TIGHTENED, UNCHANGED, cut, half_width, hull, middle
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
-
-OVERFLOW = -2
-"""Status of a step whose result is too large for double precision."""
-
-
-@kernel
-def scratch(n: int) -> Matrix:
-    """Scratch for the functions below, n states."""
-    return np.zeros((n + 7, n))
 
 
 @kernel
 def predict(
     lower: Vector, upper: Vector, A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector,
-    new_lower: Vector, new_upper: Vector, work: Matrix,
+    new_lower: Vector, new_upper: Vector, work: Scratch,
 ) -> int:  # fmt: skip
     """Time update ``c⁺ = A c + B u``, ``q⁺ = |A| q + |G| widths`` (Pavelková & Jirsa 2018, eq. 9).
 
@@ -35,7 +27,7 @@ def predict(
     Returns 0 or ``OVERFLOW``.
     """
     n, p, k = lower.size, u.size, widths.size
-    c, q = work[0], work[1]
+    c, q = work.vectors[BOX], work.vectors[BOX + 1]
     for j in range(n):
         c[j] = middle(lower[j], upper[j])
         q[j] = half_width(lower[j], upper[j], c[j])
@@ -67,15 +59,16 @@ def predict(
 @kernel
 def update(
     lower: Vector, upper: Vector, C: Matrix, y: Vector, r: Vector, meet: bool,
-    new_lower: Vector, new_upper: Vector, work: Matrix,
+    new_lower: Vector, new_upper: Vector, work: Scratch,
 ) -> int:  # fmt: skip
-    """Data update: the strips ``|y − C x| ≤ r`` cut the box as a parallelotope; its interval hull; the meet with the box.
+    """Data update: the strips ``|y − C x| ≤ r`` cut the box as a parallelotope; interval hull; meet with the box.
 
     C (m, n), y (m,) with NaN for a missing entry, r (m,). Without ``meet`` the hull may exceed the prior (Pavelková &
     Jirsa 2018, eqs. 11–13). Returns 0, ``OVERFLOW``, or k + 1 where the strip of row k is proved to miss the set.
     """
     n = lower.size
-    c, delta, strips, T = work[0], work[1], work[2:5], work[7 : 7 + n]
+    c, delta, T = work.vectors[BOX], work.vectors[DELTA], work.squares[BODY]
+    strips = work.vectors[STRIP : STRIP + STRIP_ROWS]
     for i in range(n):
         new_lower[i], new_upper[i] = lower[i], upper[i]
         delta[i] = 0.0
@@ -93,7 +86,7 @@ def update(
             last = k + 1
     if not touched:
         return 0
-    hull_lower, hull_upper = work[5], work[6]
+    hull_lower, hull_upper = work.vectors[BOX + 1], work.vectors[BOX + 2]
     if not hull(c, T, delta, hull_lower, hull_upper):
         return 0 if meet else OVERFLOW
     for i in range(n):
@@ -116,6 +109,55 @@ def meet_box(
         if new_lower[i] > new_upper[i] and status == 0:
             status = i + 1
     return status
+
+
+@kernel
+def tighten(lower: Vector, upper: Vector, p: Vector, lo: float, hi: float) -> int:
+    """Exact interval hull of the box and the strip ``lo ≤ p'x ≤ hi``, rounded outward, in place.
+
+    Returns ``EMPTY`` (proved; the box may be spoilt), ``UNCHANGED`` or ``TIGHTENED``.
+    """
+    n = lower.size
+    least, most, magnitude = 0.0, 0.0, 0.0
+    for j in range(n):
+        low, high = p[j] * lower[j], p[j] * upper[j]
+        least += min(low, high)
+        most += max(low, high)
+        magnitude += max(abs(low), abs(high))
+    error = gamma(n + 2) * magnitude
+    error += gamma(n + 4) * error + UNDERFLOW
+    least, most = down(least - error), up(most + error)
+    if least > hi or most < lo:
+        return EMPTY
+    if least >= lo and most <= hi:
+        return UNCHANGED
+    status = UNCHANGED
+    for j in range(n):
+        if p[j] != 0.0:
+            low, high = p[j] * lower[j], p[j] * upper[j]
+            # what the other coordinates add, at least and at most
+            others_least = down(down(least - min(low, high)) - error)
+            others_most = up(up(most - max(low, high)) + error)
+            first, second = down(lo - others_most) / p[j], up(hi - others_least) / p[j]
+            new_lower, new_upper = down(min(first, second)), up(max(first, second))
+            if new_lower > upper[j] or new_upper < lower[j]:
+                return EMPTY
+            if new_lower > lower[j]:
+                lower[j] = new_lower
+                status = TIGHTENED
+            if new_upper < upper[j]:
+                upper[j] = new_upper
+                status = TIGHTENED
+    return status
+
+
+@kernel
+def volume(lower: Vector, upper: Vector) -> float:
+    """``Π (upper − lower)``."""
+    product = 1.0
+    for i in range(lower.size):
+        product *= upper[i] - lower[i]
+    return product
 
 
 @kernel

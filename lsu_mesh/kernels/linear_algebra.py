@@ -1,6 +1,6 @@
 """Small dense linear algebra in explicit loops: approximate inverse, orthogonal basis, determinant.
 
-Nothing here is a bound by itself: whoever uses an inverse or a basis verifies it (see ``kernels/parallelotope.py``).
+Nothing here is a bound by itself: whoever uses an inverse or a basis verifies it (see ``kernels/enclosure.py``).
 """
 
 from __future__ import annotations
@@ -60,12 +60,12 @@ def invert(T: Matrix, inverse: Matrix, factor: Matrix) -> bool:
 
 
 @kernel
-def orthogonal_basis(columns: Matrix, basis: Matrix) -> None:
-    """Nearly orthonormal ``basis`` (n, n) along the longest columns (n, k), completed by coordinate axes.
+def orthogonal_basis(columns: Matrix, count: int, basis: Matrix) -> None:
+    """Nearly orthonormal ``basis`` (n, n) along the longest of the first columns, completed by coordinate axes.
 
     Pivoted modified Gram–Schmidt, each new direction orthogonalised twice. ``columns`` is overwritten.
     """
-    n, count = columns.shape
+    n = columns.shape[0]
     longest = 0.0
     for d in range(n):
         best, square = -1, 0.0
@@ -122,6 +122,12 @@ def _complete(basis: Matrix, d: int) -> None:
     for i in range(n):
         basis[i, d] = 1.0 if i == axis else 0.0
     _orthonormalise(basis, d)
+
+
+@kernel
+def abs_determinant(T: Matrix, factor: Matrix) -> float:
+    """``|det T|``; ``factor`` is scratch."""
+    return math.exp(log_abs_determinant(T, factor))
 
 
 @kernel

@@ -1,7 +1,7 @@
 """The strip update of a parallelotope (Vicino, Zappa 1996), sound in floating point.
 
-The set in hand is ``{c + T ξ + e : |ξ|∞ ≤ 1, |e| ≤ delta}``: ``delta`` (n,) carries what rounding has lost so far, so that
-the parallelotope itself is made to hold it only once, after the last strip (``kernels/parallelotope.py``).
+The set in hand is ``{c + T ξ + e : |ξ|∞ ≤ 1, |e| ≤ delta}``: ``delta`` (n,) carries what rounding has lost so far, so
+that the parallelotope itself is made to hold it only once, after the last strip (``kernels/enclosure.py``).
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
 EMPTY = -1
+OVERFLOW = -2
+"""Status of a step whose result is too large for double precision."""
 UNCHANGED = 0
 TIGHTENED = 1
 REPLACED = 2
@@ -71,8 +73,8 @@ def cut(c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, wo
     """Replace the set by one of the same form that holds its part in the strip ``lo ≤ p'x ≤ hi``; in place.
 
     Tightens the n strips of the parallelotope and the new one, and drops the widest of them, so that the volume never
-    grows (ALGORITHMS, strip update). Returns ``EMPTY`` (proved; the set is then untouched), ``UNCHANGED`` (the strip
-    does not cut), ``TIGHTENED`` or ``REPLACED``. ``work`` has ``STRIP_ROWS`` rows of length n. Source: Vicino, Zappa 1996.
+    grows. Returns ``EMPTY`` (proved; the set is then untouched), ``UNCHANGED`` (the strip does not cut), ``TIGHTENED``
+    or ``REPLACED``. ``work`` has ``STRIP_ROWS`` rows of length n. Source: Vicino & Zappa 1996.
     """
     g, mid, half = work[0], work[1], work[2]
     s, error, spread = project(c, T, delta, p, g)

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 class Orthotope(Support):
     """Box ``{x : lower ≤ x ≤ upper}``; lower, upper (n,), equal bounds are legal (a flat box).
 
-    Raises ``ModelError`` where the bounds are not finite, differ in length or cross. Source: Lainová et al. 2019, eq. (8).
+    Raises ``ModelError`` where the bounds are not finite, differ in length or cross.
+    Source: Lainová et al. 2019, eq. (8).
     """
 
     def __init__(self, lower: ArrayLike, upper: ArrayLike) -> None:

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.kernels import linear_algebra, parallelotope, strip
+from lsu_mesh.kernels import linear_algebra, parallelotope, step, strip
+from lsu_mesh.kernels.enclosure import enclose_along_edges
+from lsu_mesh.kernels.scratch import scratch
 from lsu_mesh.supports.arrays import finite_array, frozen
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
 from lsu_mesh.supports.support import Matrix, Support, Vector
@@ -59,8 +61,7 @@ class Parallelotope(Support):
         return lower, upper
 
     def volume(self) -> float:
-        logarithm = self.log_volume()
-        return math.exp(logarithm) if logarithm < 709.0 else math.inf
+        return step.volume_of(self._generators, np.empty_like(self._generators))
 
     def log_volume(self) -> float:
         factor = np.empty_like(self._generators)
@@ -100,13 +101,13 @@ class Parallelotope(Support):
         offset = np.zeros(n) if shift is None else np.array(finite_array("shift", shift, (n,)))
         c, T, delta = np.empty(n), np.empty((n, n)), np.empty(n)
         parallelotope.image(self._center, self._generators, R, np.eye(n), offset, c, T, delta)
-        none = np.zeros((n, 0))
-        if parallelotope.enclose_along_edges(T, none, np.zeros(0), delta, parallelotope.scratch(n, 0)):
+        work = scratch(n, 0)
+        if enclose_along_edges(T, work.no_columns, work.no_weights, delta, work):
             return Parallelotope(c, T)
         return None
 
     def strips(self) -> tuple[Matrix, Vector, Vector] | None:
-        """P (n, n), y, r (n,) with ``|y − P x| ≤ r`` for all x of the set, P ≈ T⁻¹; ``None`` where T is numerically singular."""
+        """The faces: P ≈ T⁻¹ (n, n), y, r (n,) with ``|y − P x| ≤ r`` in the set; ``None`` where T is singular."""
         n = self.dim
         P, y, r = np.empty((n, n)), np.empty(n), np.empty(n)
         found = parallelotope.faces(self._center, self._generators, P, y, r, np.empty((n, n)))
