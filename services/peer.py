@@ -48,6 +48,8 @@ class Stop:
 def run_node(node: Node, settings: SessionSettings) -> int:
     """Run a node until it is told to stop; returns the exit code."""
     stop, clock = Stop(), Clock()
+    if isinstance(node, Estimator):
+        node.rehearse()
     with Bus(settings, clock) as bus:
         peer = Peer(node, bus, clock)
         peer.declare()

@@ -332,6 +332,17 @@ class Estimator(Node):
         for step in self._steps.values():
             step.before = None
 
+    def rehearse(self) -> None:
+        """Do one step of everything and forget it, so that the first real step finds all kernels loaded."""
+        before, model = self.engine.snapshot(), self.engine.model
+        if model.output_count:
+            self.engine.update(self.engine.predict_output().point)
+        self.engine.condition(self.engine.support.interval_hull())
+        to_message(self.engine.support)
+        self.engine.bounds()
+        self.engine.predict(np.zeros(model.input_count) if model.input_count else None)
+        self.engine.restore(before)
+
     # -- what is said of the node
 
     def step(self) -> int:

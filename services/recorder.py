@@ -1,0 +1,109 @@
+"""The recorder process: subscribes to everything, owns the only recording."""
+
+from __future__ import annotations
+
+import secrets
+import sys
+import time
+from pathlib import Path
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.gate import Gate
+from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
+from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
+from services.bus import Arrival, Bus, Clock, SessionSettings
+from services.cli import COULD_NOT_START, OK
+from services.peer import Stop
+from services.recording.recorder import Recorder
+
+ROLE_NAME = "recorder"
+AFTER_STOP_S = 0.5
+"""How long the recorder goes on taking what is under way after it was told to stop."""
+
+
+def run_recorder(configuration: Configuration, record: str | None, settings: SessionSettings) -> int:
+    """Record until told to stop; returns the exit code."""
+    stop, clock = Stop(), Clock()
+    template = record or configuration.recorder.path
+    moment = time.strftime("%Y%m%d-%H%M%S")
+    path = Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        recorder = Recorder(configuration, path)
+    except OSError as error:
+        print(f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record", file=sys.stderr)
+        return COULD_NOT_START
+    try:
+        with Bus(settings, clock) as bus:
+            service = RecorderService(configuration, recorder, bus, clock)
+            service.declare()
+            while not stop:
+                service.turn()
+            end = time.monotonic() + AFTER_STOP_S
+            while time.monotonic() < end:
+                service.turn()
+    finally:
+        recorder.close()
+    return OK
+
+
+class RecorderService:
+    """The loop around the recording: drain the queue, record, flush, tell its health."""
+
+    def __init__(self, configuration: Configuration, recorder: Recorder, bus: Bus, clock: Clock) -> None:
+        self._configuration = configuration
+        self._recorder = recorder
+        self._bus = bus
+        self._clock = clock
+        self._mesh = configuration.mesh.name
+        self._gate = Gate(configuration, TYPES)
+        self._boot = secrets.token_hex(8)
+        self._sequence = 0
+        self._next_health = 0
+        self._roles = {name: role for role, name in configuration.peers()}
+
+    def declare(self) -> None:
+        """Subscribe to all topics, watch the peers, show that the recorder is there."""
+        for topic in TOPICS:
+            if topic != "live":
+                self._bus.subscribe(f"{PREFIX}/{self._mesh}/{topic}/*")
+        self._bus.watch_alive(key(self._mesh, "live", "*"))
+        self._bus.declare_alive(key(self._mesh, "live", ROLE_NAME))
+
+    def turn(self) -> None:
+        """Take what has come, then flush if it is time."""
+        arrival = self._bus.next(0.05)
+        while arrival is not None:
+            self._take(arrival)
+            arrival = self._bus.next(0)
+        now = self._clock.now()
+        self._recorder.tick(now)
+        if now >= self._next_health:
+            self._next_health = now + 1_000_000_000
+            self._tell_health(now)
+
+    def _take(self, arrival: Arrival) -> None:
+        if arrival.what == "sample":
+            duplicates = self._gate.duplicates
+            message = self._gate.admit(arrival.key, arrival.payload)
+            if message is not None or self._gate.duplicates == duplicates:
+                self._recorder.record(arrival.key, arrival.payload, arrival.arrival_ns, message)
+            return
+        address = parse(arrival.key)
+        if address is not None:
+            role = self._roles.get(address.name, "peer")
+            self._recorder.peer_changed(role, address.name, arrival.what == "alive", arrival.arrival_ns)
+
+    def _tell_health(self, now: int) -> None:
+        problems = list(self._recorder.problems)
+        if self._bus.dropped:
+            problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
+        counters = self._gate.counters | {"queue": float(self._bus.waiting()), "dropped": float(self._bus.dropped)}
+        counters |= {f"flushed {flushed}": float(seq) for flushed, seq in self._recorder.flushed.items()}
+        health = Health(
+            v=VERSION, src=f"{ROLE_NAME}/{ROLE_NAME}", boot=self._boot, seq=self._sequence, step=0, sent_ns=now,
+            origin_ns=now, model=self._configuration.digest(), role=ROLE_NAME,
+            level="WARN" if problems else "OK", reasons=problems[:16], counters=counters,
+        )  # fmt: skip
+        self._sequence += 1
+        self._bus.publish(key(self._mesh, "health", ROLE_NAME), encode(health), encoding("health"))
