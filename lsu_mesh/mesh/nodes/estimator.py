@@ -198,6 +198,9 @@ class Estimator(Node):
     def _is_ready(self, k: int, step: Step, now: int) -> bool:
         if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
             return bool(step.closed or step.arrived or self._newest > k)
+        return self._is_overdue(k, now)
+
+    def _is_overdue(self, k: int, now: int) -> bool:
         sign = self._first_sign(k)
         return sign is not None and now >= sign + self.deadline
 
@@ -210,7 +213,8 @@ class Estimator(Node):
         if self.current is None:
             return None if self._first_evidence is None else self._first_evidence + START_GRACE
         sign = self._first_sign(self.current)
-        return None if sign is None or self._combined else sign + self.deadline
+        waits = not self._combined or self.configuration.input_box is not None
+        return sign + self.deadline if sign is not None and waits else None
 
     def _is_behind(self) -> bool:
         assert self.current is not None
@@ -253,7 +257,7 @@ class Estimator(Node):
         if self.engine.model.input_count:
             if step.input is not None:
                 u = np.array(step.input.u)
-            elif self.configuration.input_box is not None and now >= (self._first_sign(k) or now) + self.deadline:
+            elif self.configuration.input_box is not None and self._is_overdue(k, now):
                 u = self.configuration.input_box
             else:
                 self._waiting = f"input of step {k}" if self._newest > k else ""
