@@ -31,7 +31,10 @@ def run_recorder(configuration: Configuration, record: str | None, settings: Ses
         path.parent.mkdir(parents=True, exist_ok=True)
         recorder = Recorder(configuration, path)
     except OSError as error:
-        print(f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record", file=sys.stderr)
+        print(
+            f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record",
+            file=sys.stderr,
+        )
         return COULD_NOT_START
     try:
         with Bus(settings, clock) as bus:

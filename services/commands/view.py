@@ -1,0 +1,32 @@
+"""``lsu-mesh view FILE``: open a recording in the native Rerun viewer."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from services.cli import COULD_NOT_START, USAGE
+
+MAGIC = (b"RRF2", b"RRF0", b"RRIO")
+
+
+def main(options: argparse.Namespace) -> int:
+    path = Path(options.file)
+    try:
+        with path.open("rb") as file:
+            magic = file.read(4)
+    except OSError as error:
+        print(f"{path}: cannot be read: {error.strerror}", file=sys.stderr)
+        return USAGE
+    if magic not in MAGIC:
+        print(f"{path}: not a Rerun recording", file=sys.stderr)
+        return USAGE
+    viewer = Path(sys.executable).parent / "rerun"
+    try:
+        return subprocess.call([str(viewer), str(path)], env={**os.environ, "DO_NOT_TRACK": "1"})
+    except FileNotFoundError:
+        print(f"{viewer} is missing; install the extra: pip install 'lsu-mesh[mesh]'", file=sys.stderr)
+        return COULD_NOT_START

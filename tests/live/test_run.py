@@ -1,0 +1,151 @@
+"""``lsu-mesh run`` with real processes and real sessions."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+pytestmark = pytest.mark.live
+
+Start = Callable[..., object]
+
+
+def until_steps_flow(session, words: str = "plant plant") -> None:  # type: ignore[no-untyped-def]
+    """Wait until the plant runs, which is started last."""
+    session.child(words)
+    time.sleep(2.0)  # the plant's first step is due a second after its start
+
+
+def test_the_demo_holds_the_truth_in_every_step_and_leaves_no_process(start_run) -> None:  # type: ignore[no-untyped-def]
+    session = start_run("--steps", "150", "--record", "demo.rrd")
+    until_steps_flow(session)
+    children = session.children()
+    assert len(children) >= 9, [" ".join(child.cmdline()) for child in children]
+    assert session.wait() == 0, session.output[1]
+    assert not any(psutil.pid_exists(child.pid) and child.is_running() for child in children)
+    rows = {row["name"]: row for row in session.of("estimator")}
+    assert set(rows) == {"box", "para", "cz", "main"}
+    for row in rows.values():
+        assert row["inside"] == 1.0, row
+        assert row["steps"] == 150, row
+        assert row["gaps"] == 0, row
+        assert row["refused"] == 0, row
+    assert rows["main"]["width"] < min(rows[name]["width"] for name in ("box", "para", "cz"))
+    assert (session.folder / "demo.rrd").stat().st_size > 10_000
+    (run,) = session.of("run")
+    assert run["recording"] == "demo.rrd"
+
+
+def test_one_interrupt_ends_the_run_cleanly_with_a_readable_recording(start_run) -> None:  # type: ignore[no-untyped-def]
+    from services.recording.read import read_raw
+
+    session = start_run("--record", "cut.rrd")
+    until_steps_flow(session)
+    children = session.children()
+    session.process.send_signal(signal.SIGINT)
+    asked = time.monotonic()
+    assert session.wait() == 0, session.output[1]
+    assert time.monotonic() - asked < 15
+    assert not any(child.is_running() for child in children)
+    assert 0 < session.of("estimator")[0]["last_step"] < 600
+    keys = {key for key, _, _ in read_raw(session.folder / "cut.rrd")}
+    assert "lsu/v1/demo/fused/main" in keys
+
+
+def test_the_others_go_on_when_a_filter_is_killed_and_the_run_says_so(start_run) -> None:  # type: ignore[no-untyped-def]
+    session = start_run("--steps", "300", "--record", "killed.rrd")
+    until_steps_flow(session)
+    session.child("filter box").kill()
+    assert session.wait() == 0, session.output[1]
+    rows = {row["name"]: row for row in session.of("estimator")}
+    for name in ("para", "cz", "main"):
+        assert rows[name]["steps"] == 300, rows[name]
+    for row in rows.values():
+        assert row["inside"] == 1.0, row
+    assert rows["box"]["restarts"] == 1
+    assert rows["box"]["last_step"] == 300, "it joined again"
+    (run,) = session.of("run")
+    assert any("filter box ended (killed by SIGKILL)" in words for words in run["happened"])
+    assert any("filter box was started again" in words for words in run["happened"])
+
+
+def test_a_subscriber_of_ten_lines_sees_fused_bounds_that_hold_the_truth(start_run, root: Path) -> None:  # type: ignore[no-untyped-def]
+    session = start_run("--steps", "250", "--no-record")
+    until_steps_flow(session)
+    command = [sys.executable, str(root / "examples" / "subscribe.py"), session.endpoint]
+    subscriber = subprocess.Popen(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert session.wait() == 0, session.output[1]
+    subscriber.send_signal(signal.SIGINT)
+    lines = subscriber.communicate(timeout=20)[0].splitlines()
+    assert len(lines) > 50
+    assert "step" in lines[-1]
+    assert session.of("estimator")[-1]["inside"] == 1.0
+
+
+def test_garbage_and_foreign_messages_are_refused_and_nobody_dies(start_run) -> None:  # type: ignore[no-untyped-def]
+    from services.bus import Bus, Clock, SessionSettings
+
+    session = start_run("--steps", "300", "--no-record")
+    until_steps_flow(session)
+    settings = SessionSettings(connect=(session.endpoint,))
+    with Bus(settings, Clock()) as bus:
+        end = time.monotonic() + 2.0
+        while time.monotonic() < end:
+            for topic, name in (("measurement", "s1"), ("posterior", "box"), ("input", "plant"), ("measurement", "s2")):
+                bus.publish(f"lsu/v1/demo/{topic}/{name}", b"\x00garbage\xff" * 20, "application/octet-stream")
+            time.sleep(0.05)
+    assert session.wait() == 0, session.output[1]
+    rows = {row["name"]: row for row in session.of("estimator")}
+    for row in rows.values():
+        assert row["inside"] == 1.0
+        assert row["last_step"] == 300
+        assert row["refused"] > 0
+        assert row["restarts"] == 0
+
+
+def test_a_taken_port_is_an_error_that_says_how_to_choose_another(start) -> None:  # type: ignore[no-untyped-def]
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        session = start("run", "--no-record", "-X", "network.entry={endpoint}", endpoint=endpoint)
+        assert session.wait() == 3
+    assert "network.entry" in session.output[1]
+
+
+def test_a_wrong_configuration_starts_nothing(start, tmp_path: Path, demo: Path) -> None:  # type: ignore[no-untyped-def]
+    text = demo.read_text().replace('kind = "LSUP"', 'kind = "LSUX"').replace('["s2", "s3"]', '["s2", "s4"]')
+    (tmp_path / "wrong.toml").write_text(text)
+    session = start("run", "wrong.toml")
+    assert session.wait() == 2
+    assert "[filters.para] kind" in session.output[1]
+    assert "[filters.cz] sensors" in session.output[1]
+    assert "2 mistakes; nothing was started" in session.output[1]
+
+
+def test_a_recording_that_cannot_be_written_is_said_before_anything_runs(start_run) -> None:  # type: ignore[no-untyped-def]
+    session = start_run("--record", "/proc/nowhere/demo.rrd")
+    assert session.wait() == 3
+    assert "/proc/nowhere" in session.output[1]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("role", ["plant plant", "sensor s1", "filter cz", "fusion main", "router router"])
+def test_a_lone_peer_stops_cleanly_when_asked(start, role: str, number: signal.Signals) -> None:  # type: ignore[no-untyped-def]
+    listen = ("-l", "{endpoint}") if role.startswith("router") else ()
+    session = start(*role.split(), *listen)
+    time.sleep(2.5)
+    assert session.process.poll() is None, session.process.communicate()
+    session.process.send_signal(number)
+    asked = time.monotonic()
+    assert session.wait(20) == 0, session.output[1]
+    assert time.monotonic() - asked < 3
