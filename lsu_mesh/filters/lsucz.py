@@ -8,29 +8,34 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsu_mesh.errors import InconsistentData, ModelError
+from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
+from lsu_mesh.filters.arguments import (
+    checked_prior,
+    half_width_vector,
+    input_interval,
+    kernel_model,
+    output_vector,
+    same_states,
+)
 from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.filters.step_arguments import half_widths, input_box, output_data, prior_support, step_model
-from lsu_mesh.kernels.reduction import reduce_complexity
-from lsu_mesh.kernels.zonotope import absorb_box, zonotope_map
+from lsu_mesh.kernels import hull, lsucz
+from lsu_mesh.kernels.constrained import meet_sets, meet_strips
+from lsu_mesh.kernels.lsucz import Body
+from lsu_mesh.kernels.reduction import exceeds
 from lsu_mesh.model import LSUModel
-from lsu_mesh.supports.arrays import frozen
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.support import Matrix, Support
-from lsu_mesh.supports.zonotope import Zonotope
+from lsu_mesh.supports.support import Support
 
 Vector = NDArray[np.float64]
 
 
 class Held(NamedTuple):
-    """What the filter knows: the state lies in ``support`` and in the box ``[lower, upper]``."""
+    """What the filter knows: the state lies in the set with arrays ``body`` = (c, G, A, b) and in [lower, upper]."""
 
-    support: ConstrainedZonotope
+    body: Body
     lower: Vector
     upper: Vector
-    is_tight: bool
-    """Whether the box is already met with the interval hull of the support."""
 
 
 class LSUCZ(Filter):
@@ -41,14 +46,20 @@ class LSUCZ(Filter):
     model, prior:
         LSU model with n states; a set, or a pair (lower, upper), that holds x_1.
     max_generators, max_constraints:
-        Complexity of the support after each step; ``None`` is no limit. At least n generators.
+        Complexity of the posterior support (P2023, Algorithm 1); ``None`` is no limit, at least n generators. A
+        prediction has up to one generator per noise and state more, until the next data update.
     point:
         ``"hull"``: centre of the interval hull (Method 1); ``"nearest"``: the point of the support that is nearest to
         the centre of its generators' box (Method 2).
 
-    Beside the constrained zonotope the filter holds a box: the interval hull *before* each reduction, carried on by interval
-    arithmetic. :meth:`bounds` is the meet of that box and the hull of :attr:`support`, so that a reduction never widens
-    what was known.
+    Raises
+    ------
+    ModelError
+        Names the option or the prior that is wrong.
+
+    Beside the constrained zonotope the filter holds a box: the interval hull *before* each reduction, carried on by
+    interval arithmetic. :meth:`bounds` is the meet of that box and the hull of :attr:`support`, so that a reduction never
+    widens what was known. What is asked of the filter between two steps does not change its later results.
     """
 
     kind: ClassVar[str] = "LSUCZ"
@@ -69,12 +80,13 @@ class LSUCZ(Filter):
         if max_constraints is not None and max_constraints < 0:
             raise ModelError(f"max_constraints must not be negative, it is {max_constraints}")
         self._model = model
+        self._arrays = kernel_model(model)
         self._limits = (
             -1 if max_generators is None else int(max_generators),
             -1 if max_constraints is None else int(max_constraints),
         )
         self._point_rule = point
-        self.reset(prior_support(prior, n))
+        self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
     @property
     def model(self) -> LSUModel:
@@ -84,7 +96,9 @@ class LSUCZ(Filter):
     @property
     def support(self) -> ConstrainedZonotope:
         """The constrained zonotope that holds the state."""
-        return self._held.support
+        if self._support is None:
+            self._support = ConstrainedZonotope.of_arrays(*self._held.body)
+        return self._support
 
     @property
     def point(self) -> Vector:
@@ -96,28 +110,30 @@ class LSUCZ(Filter):
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull of the support met with the box that is held beside it; (n,), (n,)."""
-        if not self._held.is_tight:
-            self._held = _tightened(self._held)
-        return self._held.lower, self._held.upper
+        if self._bounds is None:
+            lower, upper = self.support.bounds()
+            self._bounds = np.maximum(lower, self._held.lower), np.minimum(upper, self._held.upper)
+        return self._bounds
 
     def predict_output(self) -> OutputPrediction:
         """``C X ⊕ [−r, r]`` by safe linear programs, met with interval arithmetic over :meth:`bounds`."""
         low, high = self._noiseless_output()
-        r = self._model.r
-        lower = np.nextafter(low - r, -np.inf)
-        upper = np.nextafter(high + r, np.inf)
+        r = self._arrays.r
+        lower = np.where(r > 0, np.nextafter(low - r, -np.inf), low)
+        upper = np.where(r > 0, np.nextafter(high + r, np.inf), high)
         return OutputPrediction(lower, upper, self._model.C @ self.point)
 
     def update(self, y: ArrayLike, r: ArrayLike | None = None) -> ConstrainedZonotope:
         """Data update: one generator and one constraint per strip, then reduction (P2023 (15))."""
-        values, radius = output_data(self._model, y, r)
-        if np.isnan(values).all():
-            return self.support
-        met = Held(self.support.meet_strips(self._model.C, values, radius), self._held.lower, self._held.upper, False)
-        try:
-            self._held = self._reduced(_tightened(met))
-        except InconsistentData as contradiction:
-            raise self._explained(values, radius) from contradiction
+        values = output_vector(y, self._model.output_count)
+        widths = half_width_vector("r", r, self._arrays.r)
+        if not np.isnan(values).all():
+            c, G, A, b = self._held.body
+            cut = (c, *meet_strips(c, G, A, b, self._arrays.C, values, widths))
+            try:
+                self._hold(self._settled(Held(cut, self._held.lower, self._held.upper)))
+            except InconsistentData as contradiction:
+                raise self._explained(values, widths) from contradiction
         return self.support
 
     def predict(
@@ -127,136 +143,113 @@ class LSUCZ(Filter):
         model: LSUModel | None = None,
     ) -> ConstrainedZonotope:
         """Time update ``A X ⊕ B u ⊕ N box(rho)`` (P2023 (16)), met with ``model.domain`` where it exceeds it."""
-        used = step_model(self._model, model)
-        center, reach = input_box(used, u)
-        noise = half_widths("rho", used.rho if rho is None else rho, used.rho.size)
-        R = np.hstack([used.A, np.zeros((used.state_count, 0)) if used.B is None else used.B, _noise_map(used)])
-        added = np.concatenate([center, np.zeros(noise.size)])
-        widths = np.concatenate([reach, noise])
-        lower, upper = self.bounds()
-        box = _mapped_box(R, np.concatenate([0.5 * lower + 0.5 * upper, added]), _reach(lower, upper), widths)
-        held = Held(_mapped(R, self.support, added, widths), *box.bounds(), is_tight=False)
-        self._held = self._reduced(held if used.domain is None else _within(held, used.domain))
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else kernel_model(used)
+        center, half_widths = input_interval(u, used.input_count)
+        widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
+        held = self._held if self._is_within_limits(self._held) else self._settled(self._held)
+        finite, *moved = lsucz.predict(*held, arrays.A, arrays.B, center, arrays.G, widths)
+        if not finite:
+            raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
+        self._hold(Held(*moved) if used.domain is None else _within(Held(*moved), used.domain))
         return self.support
 
     def condition(self, support: Support) -> float:
-        """Keep ``X ∩ support``; the gain is measured on interval hulls, in nats."""
-        other = prior_support(support, self._model.state_count)
-        lower, upper = self.bounds()
-        other_lower, other_upper = other.bounds()
-        met = Held(self._met(other), np.maximum(lower, other_lower), np.minimum(upper, other_upper), False)
-        self._held = self._reduced(_tightened(met))
-        return _log_ratio(upper - lower, self._held.upper - self._held.lower)
+        """Keep ``X ∩ support``; the gain, in nats, is that of the interval hulls."""
+        other = checked_prior(self._model, support)
+        before = np.subtract(*self.bounds())
+        lower, upper = other.bounds()
+        box = np.maximum(self._held.lower, lower), np.minimum(self._held.upper, upper)
+        try:
+            met = meet_sets(*self._held.body, *self._transferable(other))
+            self._hold(self._settled(Held((self._held.body[0], *met), *box)))
+        except InconsistentData as contradiction:
+            raise InconsistentData(
+                f"the set of {self.kind} and the transferred set have no point in common"
+            ) from contradiction
+        return _log_ratio(before, np.subtract(*self.bounds()))
 
     def reset(self, support: Support) -> None:
         """Start again from a set that is known to hold the state now."""
-        given = prior_support(support, self._model.state_count)
-        lower, upper = given.bounds()
-        self._held = self._reduced(Held(given.to_constrained_zonotope(), lower, upper, is_tight=True))
+        given = checked_prior(self._model, support)
+        held = Held(given.to_constrained_zonotope().arrays, *map(np.array, given.bounds()))
+        self._hold(held if self._is_within_limits(held) else self._settled(held))
 
     def snapshot(self) -> Held:
-        """Support and box; both immutable."""
+        """The set and the box; neither is ever written again."""
         return self._held
 
     def restore(self, snapshot: object) -> None:
-        """Return to a state taken by :meth:`snapshot`."""
+        """Return to a state taken by :meth:`snapshot`, bit by bit."""
         if not isinstance(snapshot, Held):
-            raise ModelError("the snapshot is not one of LSUCZ")
-        self._held = snapshot
+            raise ModelError(f"the snapshot must be one of LSUCZ, it is {type(snapshot).__name__}")
+        self._hold(snapshot)
 
-    def _reduced(self, held: Held) -> Held:
-        z = held.support
-        arrays = reduce_complexity(z._center, z._generators, z._A, z._b, *self._limits)
-        if arrays[1] is z._generators:
-            return held
-        return held._replace(support=ConstrainedZonotope._of(*arrays))
+    def _hold(self, held: Held) -> None:
+        self._held = held
+        self._support: ConstrainedZonotope | None = None
+        self._bounds: tuple[Vector, Vector] | None = None
 
-    def _met(self, other: Support) -> ConstrainedZonotope:
-        """``X ∩ other``; a set too complex to be intersected within three times the limits enters as its box."""
+    def _is_within_limits(self, held: Held) -> bool:
+        return not exceeds(*held.body[2].shape[::-1], *self._limits)
+
+    def _settled(self, held: Held) -> Held:
+        """Hull, then reduction; raises ``InconsistentData`` where the set is proved empty."""
+        status, body, lower, upper = lsucz.settle(*held.body, held.lower, held.upper, *self._limits)
+        if status == hull.LOOSE:  # the bounds are true; another solver may know better ones
+            tighter = ConstrainedZonotope.of_arrays(*held.body).bounds()
+            lower, upper = np.maximum(lower, tighter[0]), np.minimum(upper, tighter[1])
+        if status == hull.EMPTY or (lower > upper).any():
+            raise InconsistentData("the sets are proved to have no point in common")
+        return Held(body, lower, upper)
+
+    def _transferable(self, other: Support) -> Body:
+        """The other set's arrays, or those of its box where it is far more complex than this filter's own."""
         joined = other.to_constrained_zonotope()
         limit = self._limits[0]
         if limit >= 0 and joined.generator_count > 3 * max(limit, self._model.state_count):
-            return self.support.intersect(other.interval_hull())
-        return self.support.intersect(joined)
+            joined = other.interval_hull().to_constrained_zonotope()
+        return joined.arrays
 
     def _noiseless_output(self) -> tuple[Vector, Vector]:
-        C = np.array(self._model.C)
-        lower, upper = self.bounds()
-        none = np.zeros(0)
-        box_lower, box_upper = _mapped_box(C, 0.5 * lower + 0.5 * upper, _reach(lower, upper), none).bounds()
-        if not C.shape[0]:
-            return box_lower, box_upper
-        low, high = self.support.ranges(C)
-        return np.maximum(low, box_lower), np.minimum(high, box_upper)
+        low, high = self.support.ranges(self._arrays.C)
+        box_low, box_high = lsucz.image_of_box(self._arrays.C, *self.bounds())
+        return np.maximum(low, box_low), np.minimum(high, box_high)
 
     def _explained(self, y: Vector, r: Vector) -> InconsistentData:
-        """The contradiction with the rows whose strip alone misses the set, widest gap first."""
+        """The contradiction, with the rows whose strip alone misses the set."""
         low, high = self._noiseless_output()
         gaps = np.fmax(low - (y + r), (y - r) - high)
-        rows = [int(i) for i in np.argsort(-gaps) if gaps[i] > 0]
-        if not rows:
-            return InconsistentData("the strips together are proved to miss the set; none alone does")
-        names = ", ".join(self._model.outputs[i] for i in rows)
-        return InconsistentData(
-            f"{names}: the strip misses the predicted set by {gaps[rows[0]]:.6g}", rows, float(gaps[rows[0]])
-        )
-
-
-def _tightened(held: Held) -> Held:
-    """Meet the box with the hull of the support; raises ``InconsistentData`` where nothing is left."""
-    lower, upper = held.support.bounds()
-    lower, upper = np.maximum(lower, held.lower), np.minimum(upper, held.upper)
-    if (lower > upper).any():
-        raise InconsistentData("the sets are proved to have no common point")
-    return Held(held.support, frozen(lower), frozen(upper), is_tight=True)
+        alone = [int(i) for i in np.flatnonzero(gaps > 0)]
+        names = self._model.outputs
+        if alone:
+            listed = ", ".join(f"{names[i]} (by {gaps[i]:.3g})" for i in alone)
+            return InconsistentData(f"outside its predicted interval: {listed}", alone, float(gaps[alone[0]]))
+        rows = [int(i) for i in np.flatnonzero(~np.isnan(y))]
+        listed = ", ".join(names[i] for i in rows)
+        return InconsistentData(f"the strips of {listed} and the prediction have no point in common", rows)
 
 
 def _within(held: Held, domain: Orthotope) -> Held:
-    """Meet with the domain; only the coordinates that exceed it cost a generator and a constraint."""
-    lower, upper = held.support.bounds()
-    exceeded = (lower < domain.lower) | (upper > domain.upper)
-    met = held.support
+    """Meet with the domain; only coordinates in which the set exceeds it cost a generator and a constraint."""
+    c, G, A, b = held.body
+    lower, upper = np.maximum(held.lower, domain.lower), np.minimum(held.upper, domain.upper)
+    exceeded = (held.lower < domain.lower) | (held.upper > domain.upper)
+    body = held.body
     if exceeded.any():
+        low, high = ConstrainedZonotope.of_arrays(*held.body).bounds()
+        exceeded &= (low < domain.lower) | (high > domain.upper)
         middle = np.where(exceeded, domain.center, np.nan)
-        met = met.meet_strips(np.eye(domain.dim), middle, domain.half_widths)
-    box = np.maximum(held.lower, domain.lower), np.minimum(held.upper, domain.upper)
-    return _tightened(Held(met, *box, is_tight=False))
-
-
-def _noise_map(model: LSUModel) -> Matrix:
-    return np.eye(model.state_count) if model.noise_map is None else model.noise_map
-
-
-def _mapped(R: Matrix, support: ConstrainedZonotope, added: Vector, widths: Vector) -> ConstrainedZonotope:
-    """``R [X; added ± widths]`` with the box of its rounding absorbed."""
-    n, g = support.dim, support.generator_count
-    used = np.flatnonzero(widths)
-    stacked = np.zeros((n + added.size, g + used.size))
-    stacked[:n, :g] = support._generators
-    stacked[n + used, g + np.arange(used.size)] = widths[used]
-    center, generators, slack = zonotope_map(
-        np.ascontiguousarray(R), np.concatenate([support._center, added]), stacked, np.zeros(n)
-    )
-    A = np.zeros((support.constraint_count, g + used.size))
-    A[:, :g] = support._A
-    generators, A = absorb_box(generators, A, slack)
-    return ConstrainedZonotope._of(center, generators, A, support._b)
-
-
-def _mapped_box(R: Matrix, center: Vector, reach: Vector, widths: Vector) -> Zonotope:
-    """``R`` times the box with this centre and half-widths ``[reach; widths]``, as a zonotope."""
-    box = Zonotope(center, np.diag(np.concatenate([reach, widths])))
-    return box.linear_map(R)
-
-
-def _reach(lower: Vector, upper: Vector) -> Vector:
-    """Half-widths about the rounded centre, rounded up."""
-    return Orthotope(lower, upper).half_widths
+        body = (c, *meet_strips(c, G, A, b, np.eye(domain.dim), middle, np.array(domain.half_widths)))
+    if (lower > upper).any() or ConstrainedZonotope.of_arrays(*body).is_empty():
+        raise InconsistentData("the prediction is proved to miss the domain")
+    return Held(body, lower, upper)
 
 
 def _log_ratio(before: Vector, after: Vector) -> float:
-    """``ln Π before − ln Π after`` over the coordinates that still have a width, never negative."""
-    wide = (before > 0) & (after > 0)
-    if ((before > 0) & (after <= 0)).any():
+    """``ln Π|before| − ln Π|after|`` over the coordinates that had a width; ``inf`` where one has vanished."""
+    before, after = np.abs(before), np.abs(after)
+    had = before > 0
+    if (after[had] == 0).any():
         return math.inf
-    return max(0.0, float(np.sum(np.log(before[wide]) - np.log(after[wide]))))
+    return max(0.0, float(np.sum(np.log(before[had]) - np.log(after[had]))))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
-from lsu_mesh.kernels.zonotope import subtraction_error
+from lsu_mesh.kernels.zonotope import padded, subtraction_error
 
 Array = NDArray[np.float64]
 
@@ -35,12 +35,11 @@ def meet_strips(
     for i in range(P.shape[0]):
         if not np.isnan(middle[i]):
             k += 1
-    generators = np.zeros((n, g + k))
-    generators[:, :g] = G
-    rows = np.zeros((m + k, g + k))
-    rows[:m, :g] = A
+    generators = padded(G, n, g + k)
+    rows = padded(A, m + k, g + k)
     sides = np.empty(m + k)
-    sides[:m] = b
+    for i in range(m):
+        sides[i] = b[i]
     t = 0
     for i in range(P.shape[0]):
         if np.isnan(middle[i]):
@@ -74,18 +73,20 @@ def meet_sets(
     g2 = G2.shape[1]
     m = A.shape[0]
     m2 = A2.shape[0]
-    generators = np.zeros((n, g + g2))
-    generators[:, :g] = G
-    rows = np.zeros((m + m2 + n, g + g2))
-    rows[:m, :g] = A
-    rows[m : m + m2, g:] = A2
+    generators = padded(G, n, g + g2)
+    rows = padded(A, m + m2 + n, g + g2)
     sides = np.empty(m + m2 + n)
-    sides[:m] = b
-    sides[m : m + m2] = b2
+    for i in range(m):
+        sides[i] = b[i]
+    for i in range(m2):
+        sides[m + i] = b2[i]
+        for j in range(g2):
+            rows[m + i, g + j] = A2[i, j]
     slack = np.zeros(m + m2 + n)
     for i in range(n):
         t = m + m2 + i
-        rows[t, :g] = G[i]
+        for j in range(g):
+            rows[t, j] = G[i, j]
         for j in range(g2):
             rows[t, g + j] = -G2[i, j]
         sides[t] = c2[i] - c[i]
@@ -101,9 +102,10 @@ def absorb_rows(G: Array, A: Array, slack: Array) -> tuple[Array, Array]:
     """Loosen row i of ``A ξ = b`` by ``slack_i``: grow a column private to that row, or append one (see the module)."""
     n, g = G.shape
     m = A.shape[0]
-    host = np.full(m, -1)
+    host = np.empty(m, dtype=np.int64)
     missing = 0
     for i in range(m):
+        host[i] = -1
         if slack[i] <= 0.0:
             continue
         for j in range(g - 1, -1, -1):
@@ -119,10 +121,8 @@ def absorb_rows(G: Array, A: Array, slack: Array) -> tuple[Array, Array]:
                 break
         if host[i] < 0:
             missing += 1
-    generators = np.zeros((n, g + missing))
-    rows = np.zeros((m, g + missing))
-    generators[:, :g] = G
-    rows[:, :g] = A
+    generators = padded(G, n, g + missing)
+    rows = padded(A, m, g + missing)
     place = g
     for i in range(m):
         if slack[i] <= 0.0:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound
+from lsu_mesh.kernels.rounding import down, up
 from lsu_mesh.kernels.simplex import (
     basic_levels,
     canonical_tableau,
@@ -30,93 +33,178 @@ GAP = 1e-9
 """Distance between a bound and the best point found, relative to ``Σ|d_j|``, above which the bound is called loose."""
 
 
+class Program(NamedTuple):
+    """A feasible set with a vertex of it: scaled rows (m, g), their sides (m,) and absolute sums (m,), the tableau
+    (m, g + m), basis (m,), nonbasic bounds (g,), basic levels (m,), and room for multipliers (m,)."""
+
+    rows: Array
+    sides: Array
+    sums: Array
+    tableau: Array
+    basis: NDArray[np.int64]
+    at: Array
+    level: Array
+    multipliers: Array
+
+
+@kernel
+def open_program(A: Array, b: Array) -> tuple[int, Program]:
+    """Find a first vertex, from a canonical basis; status ``TIGHT``, ``LOOSE`` where none was found, or ``EMPTY``."""
+    m, g = A.shape
+    rows, sides = scaled_rows(A, b)
+    sums = absolute_row_sums(rows)
+    tableau, basis = canonical_tableau(rows)
+    program = Program(rows, sides, sums, tableau, basis, np.empty(g), np.empty(m), np.zeros(m))
+    starting_bounds(tableau, sides, basis, program.at, program.level)
+    if _contradicts(program):
+        return EMPTY, program
+    found = find_vertex(tableau, basis, program.at, program.level, program.multipliers)
+    if _farkas(program, program.multipliers):
+        return EMPTY, program
+    return (TIGHT if found else LOOSE), program
+
+
+@kernel
+def maximise(program: Program, d: Array, point: Array) -> tuple[float, bool]:
+    """Safe upper bound of ``max d'ξ`` and whether ``point`` (g,), which is written, attains it to rounding.
+
+    Starts from the vertex where the program stands and leaves it at the new one.
+    """
+    m, g = program.rows.shape
+    basic_levels(program.tableau, program.sides, program.basis, program.at, program.level)
+    done = climb(program.tableau, program.basis, program.at, program.level, d, program.multipliers)
+    refine_multipliers(program.rows, program.tableau, program.basis, d, program.multipliers)
+    value = dual_bound(d, program.rows, program.sides, program.sums, program.multipliers)
+    for j in range(g):
+        point[j] = program.at[j]
+    for i in range(m):
+        if program.basis[i] >= 0:
+            point[program.basis[i]] = program.level[i]
+    reached = 0.0
+    size = 0.0
+    for j in range(g):
+        reached += d[j] * point[j]
+        size += abs(d[j])
+    return value, done and value - reached <= GAP * size
+
+
 @kernel
 def safe_maxima(D: Array, A: Array, b: Array) -> tuple[int, Array, Array]:
     """Upper bounds of ``max {d'ξ : A ξ = b, |ξ|∞ ≤ 1}`` for the rows d of D (k, g).
 
     Returns the status, the bounds (k,), rounded up, and points (k, g) that attain them in floating point. The bounds
-    are true whatever the status; on ``EMPTY`` they mean nothing. Objectives are solved in order, each from the last vertex,
-    the first from a canonical one, so that the same arrays give the same bits.
+    are true whatever the status; on ``EMPTY`` they mean nothing. Objectives are solved in order, each from the last
+    vertex, the first from a canonical one, so that the same arrays give the same bits.
     """
     k, g = D.shape
-    m = A.shape[0]
     values = np.empty(k)
     points = np.empty((k, g))
-    rows, sides = scaled_rows(A, b)
-    sums = absolute_row_sums(rows)
-    T, basis = canonical_tableau(rows)
-    at = np.empty(g)
-    level = np.empty(m)
-    y = np.zeros(m)
-    starting_bounds(T, sides, basis, at, level)
-    if _contradicts(rows, sides, sums, T, basis, level, y):
+    status, program = open_program(A, b)
+    if status == EMPTY:
         return EMPTY, values, points
-    found = find_vertex(T, basis, at, level, y)
-    if _farkas(rows, sides, sums, T, y):
-        return EMPTY, values, points
-    status = TIGHT if found else LOOSE
     for t in range(k):
-        d = D[t]
-        basic_levels(T, sides, basis, at, level)
-        done = climb(T, basis, at, level, d, y)
-        refine_multipliers(rows, T, basis, d, y)
-        values[t] = dual_bound(d, rows, sides, sums, y)
-        reached = 0.0
-        size = 0.0
-        for j in range(g):
-            points[t, j] = at[j]
-            size += abs(d[j])
-        for i in range(m):
-            if basis[i] >= 0:
-                points[t, basis[i]] = level[i]
-        for j in range(g):
-            reached += d[j] * points[t, j]
-        if not done or not values[t] - reached <= GAP * size:
+        values[t], tight = maximise(program, D[t], points[t])
+        if not tight:
             status = LOOSE
     return status, values, points
 
 
 @kernel
-def proves_empty(A: Array, b: Array) -> tuple[bool, bool]:
-    """Whether ``{ξ : A ξ = b, |ξ|∞ ≤ 1}`` is proved empty, and whether the simplex came to its end."""
-    m, g = A.shape
-    rows, sides = scaled_rows(A, b)
-    sums = absolute_row_sums(rows)
-    T, basis = canonical_tableau(rows)
-    at = np.empty(g)
-    level = np.empty(m)
-    y = np.zeros(m)
-    starting_bounds(T, sides, basis, at, level)
-    if _contradicts(rows, sides, sums, T, basis, level, y):
-        return True, True
-    found = find_vertex(T, basis, at, level, y)
-    return _farkas(rows, sides, sums, T, y), found
+def interval_hull(program: Program, c: Array, G: Array, lower: Array, upper: Array, points: Array) -> int:
+    """Meet the box [lower, upper] (n,), in place, with the hull of ``{c + G ξ}``; status.
+
+    ``points`` (2n, g) receives the ξ that attain the upper, then the lower sides.
+    """
+    n, g = G.shape
+    status = TIGHT
+    d = np.empty(g)
+    for t in range(2 * n):
+        i = t if t < n else t - n
+        sign = 1.0 if t < n else -1.0
+        for j in range(g):
+            d[j] = sign * G[i, j]
+        value, tight = maximise(program, d, points[t])
+        if not tight:
+            status = LOOSE
+        if t < n:
+            upper[i] = min(upper[i], up(c[i] + value))
+        else:
+            lower[i] = max(lower[i], down(c[i] - value))
+    for i in range(n):
+        if lower[i] > upper[i]:
+            return EMPTY
+    return status
 
 
 @kernel
-def _contradicts(
-    rows: Array, sides: Array, sums: Array, T: Array, basis: NDArray[np.int64], level: Array, y: Array
-) -> bool:
+def variable_ranges(program: Program, points: Array, low: Array, high: Array) -> None:
+    """Ranges [low, high] (g,) of the ξ_j over the set, rounded outward and within [−1, 1].
+
+    A feasible point with ξ_j = ±1 shows that this side cannot be tightened: ``points`` (k, g), and the vertices met on
+    the way, save most of the 2g programs.
+    """
+    g = low.size
+    for j in range(g):
+        low[j], high[j] = 1.0, -1.0
+        for t in range(points.shape[0]):
+            low[j] = min(low[j], points[t, j])
+            high[j] = max(high[j], points[t, j])
+    d = np.zeros(g)
+    vertex = np.empty(g)
+    touching = 1.0 - 1e-9
+    for t in range(2 * g):
+        j = t // 2
+        sign = 1.0 if t % 2 == 0 else -1.0
+        if (sign > 0.0 and high[j] >= touching) or (sign < 0.0 and low[j] <= -touching):
+            continue
+        d[j] = sign
+        value, _ = maximise(program, d, vertex)
+        d[j] = 0.0
+        for k in range(g):
+            low[k] = min(low[k], vertex[k])
+            high[k] = max(high[k], vertex[k])
+        if sign > 0.0:
+            high[j] = max(high[j], min(1.0, value))
+        else:
+            low[j] = min(low[j], max(-1.0, -value))
+    for j in range(g):
+        if high[j] >= touching:
+            high[j] = 1.0
+        if low[j] <= -touching:
+            low[j] = -1.0
+
+
+@kernel
+def proves_empty(A: Array, b: Array) -> tuple[bool, bool]:
+    """Whether ``{ξ : A ξ = b, |ξ|∞ ≤ 1}`` is proved empty, and whether the simplex came to its end."""
+    status, _ = open_program(A, b)
+    return status == EMPTY, status != LOOSE
+
+
+@kernel
+def _contradicts(program: Program) -> bool:
     """Whether a row that depends on the others proves emptiness: its left side vanishes and its right side does not."""
-    m, g = rows.shape
+    m, g = program.rows.shape
+    y = np.empty(m)
     for i in range(m):
-        if basis[i] < 0 and level[i] != 0.0:
+        if program.basis[i] < 0 and program.level[i] != 0.0:
+            sign = -1.0 if program.level[i] > 0.0 else 1.0
             for k in range(m):
-                y[k] = -T[i, g + k] if level[i] > 0.0 else T[i, g + k]
-            if dual_bound(np.zeros(g), rows, sides, sums, y) < 0.0:
+                y[k] = sign * program.tableau[i, g + k]
+            if dual_bound(np.zeros(g), program.rows, program.sides, program.sums, y) < 0.0:
                 return True
     return False
 
 
 @kernel
-def _farkas(rows: Array, sides: Array, sums: Array, T: Array, sigma: Array) -> bool:
+def _farkas(program: Program, sigma: Array) -> bool:
     """Whether the ray ``y = −σ'B⁻¹`` of phase one proves emptiness."""
-    m, g = rows.shape
+    m, g = program.rows.shape
     y = np.zeros(m)
     some = False
     for i in range(m):
         if sigma[i] != 0.0:
             some = True
             for k in range(m):
-                y[k] -= sigma[i] * T[i, g + k]
-    return some and dual_bound(np.zeros(g), rows, sides, sums, y) < 0.0
+                y[k] -= sigma[i] * program.tableau[i, g + k]
+    return some and dual_bound(np.zeros(g), program.rows, program.sides, program.sums, y) < 0.0

@@ -56,9 +56,11 @@ def canonical_tableau(A: Array) -> tuple[Array, Indices]:
     """``T = B⁻¹ [A | I]`` (m, g + m) and the basis (m,) by Gauss–Jordan elimination with full pivoting."""
     m, g = A.shape
     T = np.zeros((m, g + m))
-    basis = np.full(m, -1)
+    basis = np.empty(m, dtype=np.int64)
     for i in range(m):
-        T[i, :g] = A[i]
+        basis[i] = -1
+        for j in range(g):
+            T[i, j] = A[i, j]
         T[i, g + i] = 1.0
     for _ in range(m):
         best, p, q = DEPENDENT, -1, -1
@@ -223,7 +225,8 @@ def find_vertex(T: Array, basis: Indices, at: Array, level: Array, sigma: Array)
     idle = 0
     for _ in range(200 + 20 * (m + g)):
         beyond = False
-        reduced[:] = 0.0
+        for j in range(g):
+            reduced[j] = 0.0
         for i in range(m):
             sigma[i] = 0.0
             if basis[i] >= 0 and abs(level[i]) > 1.0 + FEASIBLE:
@@ -251,10 +254,10 @@ def climb(T: Array, basis: Indices, at: Array, level: Array, d: Array, y: Array)
     m = T.shape[0]
     g = at.size
     largest = 0.0
+    reduced = np.zeros(g + m)
     for j in range(g):
         largest = max(largest, abs(d[j]))
-    reduced = np.zeros(g + m)
-    reduced[:g] = d
+        reduced[j] = d[j]
     for i in range(m):
         if basis[i] >= 0:
             cost = d[basis[i]]

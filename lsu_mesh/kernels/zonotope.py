@@ -111,6 +111,16 @@ def zonotope_support(c: Array, G: Array, d: Array) -> float:
 
 
 @kernel
+def padded(M: Array, rows: int, columns: int) -> Array:
+    """M in the top left corner of a matrix of zeros (rows, columns)."""
+    larger = np.zeros((rows, columns))
+    for i in range(M.shape[0]):
+        for j in range(M.shape[1]):
+            larger[i, j] = M[i, j]
+    return larger
+
+
+@kernel
 def absorb_box(G: Array, A: Array, slack: Array) -> tuple[Array, Array]:
     """Generators (n, g′) and constraint columns (m, g′) of the set ``⊕ box(slack)``.
 
@@ -120,9 +130,10 @@ def absorb_box(G: Array, A: Array, slack: Array) -> tuple[Array, Array]:
     """
     n, g = G.shape
     m = A.shape[0]
-    host = np.full(n, -1)
+    host = np.empty(n, dtype=np.int64)
     missing = 0
     for i in range(n):
+        host[i] = -1
         if slack[i] <= 0.0:
             continue
         for j in range(g):
@@ -138,10 +149,8 @@ def absorb_box(G: Array, A: Array, slack: Array) -> tuple[Array, Array]:
                 break
         if host[i] < 0:
             missing += 1
-    generators = np.zeros((n, g + missing))
-    columns = np.zeros((m, g + missing))
-    generators[:, :g] = G
-    columns[:, :g] = A
+    generators = padded(G, n, g + missing)
+    columns = padded(A, m, g + missing)
     place = g
     for i in range(n):
         if slack[i] <= 0.0:

@@ -49,8 +49,8 @@ class ConstrainedZonotope(Support):
         self._bounds: tuple[Vector, Vector] | None = None
 
     @classmethod
-    def _of(cls, center: Vector, generators: Matrix, A: Matrix, b: Vector) -> ConstrainedZonotope:
-        """A set of arrays that kernels made: no copy, no check."""
+    def of_arrays(cls, center: Vector, generators: Matrix, A: Matrix, b: Vector) -> ConstrainedZonotope:
+        """A set of writable contiguous arrays that kernels made: no copy, no check."""
         made = cls.__new__(cls)
         made._center, made._generators, made._A, made._b = center, generators, A, b
         made._bounds = None
@@ -80,6 +80,11 @@ class ConstrainedZonotope(Support):
     def b(self) -> Vector:
         """Constraint sides (m,)."""
         return frozen(self._b.view())
+
+    @property
+    def arrays(self) -> tuple[Vector, Matrix, Matrix, Vector]:
+        """(c, G, A, b) for kernels; not to be written."""
+        return self._center, self._generators, self._A, self._b
 
     @property
     def generator_count(self) -> int:
@@ -182,7 +187,7 @@ class ConstrainedZonotope(Support):
         matrix, offset = map_arguments(R, shift, self.dim)
         center, generators, slack = zonotope_map(matrix, self._center, self._generators, offset)
         generators, A = absorb_box(generators, self._A, slack)
-        return ConstrainedZonotope._of(center, generators, A, self._b)
+        return ConstrainedZonotope.of_arrays(center, generators, A, self._b)
 
     def minkowski_sum(self, other: Support) -> ConstrainedZonotope:
         """``{[G G₂], c + c₂, blockdiag(A, A₂), [b; b₂]}`` (P2023 (12)) and the box of its rounding."""
@@ -194,7 +199,7 @@ class ConstrainedZonotope(Support):
         A[: self.constraint_count, :g] = self._A
         A[self.constraint_count :, g:] = added._A
         generators, A = absorb_box(np.hstack([self._generators, added._generators]), A, slack)
-        return ConstrainedZonotope._of(center, generators, A, np.concatenate([self._b, added._b]))
+        return ConstrainedZonotope.of_arrays(center, generators, A, np.concatenate([self._b, added._b]))
 
     def intersect(self, other: Support) -> ConstrainedZonotope:
         """``Z ∩ Y`` (P2023 (13), R = I): n constraints more; what is proved empty says so in :meth:`is_empty`."""
@@ -203,7 +208,7 @@ class ConstrainedZonotope(Support):
         arrays = meet_sets(
             self._center, self._generators, self._A, self._b, met._center, met._generators, met._A, met._b
         )
-        return ConstrainedZonotope._of(self._center, *arrays)
+        return ConstrainedZonotope.of_arrays(self._center, *arrays)
 
     def meet_strips(self, P: ArrayLike, middle: ArrayLike, radius: ArrayLike) -> ConstrainedZonotope:
         """``{x ∈ Z : |P_i x − middle_i| ≤ radius_i}``, P (k, n), middle (k,) with NaN for no strip, radius (k,) ≥ 0."""
@@ -212,7 +217,7 @@ class ConstrainedZonotope(Support):
         half = np.array(finite_array("radius", radius, (k,)))
         centers: NDArray[np.float64] = np.array(middle, dtype=np.float64).reshape(k)
         arrays = meet_strips(self._center, self._generators, self._A, self._b, rows, centers, half)
-        return ConstrainedZonotope._of(self._center, *arrays)
+        return ConstrainedZonotope.of_arrays(self._center, *arrays)
 
     def to_constrained_zonotope(self) -> ConstrainedZonotope:
         """The set itself."""

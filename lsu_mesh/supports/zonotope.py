@@ -114,7 +114,7 @@ class Zonotope(Support):
     def to_constrained_zonotope(self) -> ConstrainedZonotope:
         """The same set, without constraints; exact."""
         g = self._generators.shape[1]
-        return ConstrainedZonotope._of(self._center, self._generators, np.zeros((0, g)), np.zeros(0))
+        return ConstrainedZonotope.of_arrays(self._center, self._generators, np.zeros((0, g)), np.zeros(0))
 
     def __repr__(self) -> str:
         return f"Zonotope(dim={self.dim}, generators={self._generators.shape[1]})"
