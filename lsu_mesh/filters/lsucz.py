@@ -18,13 +18,12 @@ from lsu_mesh.filters.arguments import (
     same_states,
 )
 from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.kernels import hull, lsucz
 from lsu_mesh.kernels.constrained import meet_sets, meet_strips
-from lsu_mesh.kernels.lsucz import Body
-from lsu_mesh.kernels.reduction import exceeds
+from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.reduction import Body, Limits, settle
 from lsu_mesh.supports.support import Support
 
 Vector = NDArray[np.float64]
@@ -36,6 +35,8 @@ class Held(NamedTuple):
     body: Body
     lower: Vector
     upper: Vector
+    is_hull: bool
+    """Whether the box is the meet with the interval hull of the set already."""
 
 
 class LSUCZ(Filter):
@@ -63,6 +64,9 @@ class LSUCZ(Filter):
     """
 
     kind: ClassVar[str] = "LSUCZ"
+    _held: Held
+    _support: ConstrainedZonotope | None
+    _bounds: tuple[Vector, Vector] | None
 
     def __init__(
         self,
@@ -81,10 +85,7 @@ class LSUCZ(Filter):
             raise ModelError(f"max_constraints must not be negative, it is {max_constraints}")
         self._model = model
         self._arrays = kernel_model(model)
-        self._limits = (
-            -1 if max_generators is None else int(max_generators),
-            -1 if max_constraints is None else int(max_constraints),
-        )
+        self._limits = Limits(max_generators, max_constraints)
         self._point_rule = point
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
@@ -110,6 +111,8 @@ class LSUCZ(Filter):
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull of the support met with the box that is held beside it; (n,), (n,)."""
+        if self._held.is_hull:
+            return self._held.lower, self._held.upper
         if self._bounds is None:
             lower, upper = self.support.bounds()
             self._bounds = np.maximum(lower, self._held.lower), np.minimum(upper, self._held.upper)
@@ -131,7 +134,7 @@ class LSUCZ(Filter):
             c, G, A, b = self._held.body
             cut = (c, *meet_strips(c, G, A, b, self._arrays.C, values, widths))
             try:
-                self._hold(self._settled(Held(cut, self._held.lower, self._held.upper)))
+                self._hold(self._settled(cut, self._held.lower, self._held.upper))
             except InconsistentData as contradiction:
                 raise self._explained(values, widths) from contradiction
         return self.support
@@ -147,11 +150,16 @@ class LSUCZ(Filter):
         arrays = self._arrays if model is None else kernel_model(used)
         center, half_widths = input_interval(u, used.input_count)
         widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
-        held = self._held if self._is_within_limits(self._held) else self._settled(self._held)
-        finite, *moved = lsucz.predict(*held, arrays.A, arrays.B, center, arrays.G, widths)
+        body, lower, upper, _ = self._held
+        if not self._limits.allow(body):
+            body, lower, upper, _ = self._settled(body, lower, upper)
+        finite, body, lower, upper = predict_constrained(
+            body, lower, upper, arrays.A, arrays.B, center, arrays.G, widths
+        )
         if not finite:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
-        self._hold(Held(*moved) if used.domain is None else _within(Held(*moved), used.domain))
+        held = Held(body, lower, upper, is_hull=False)
+        self._hold(held if used.domain is None else _within(held, used.domain))
         return self.support
 
     def condition(self, support: Support) -> float:
@@ -162,7 +170,7 @@ class LSUCZ(Filter):
         box = np.maximum(self._held.lower, lower), np.minimum(self._held.upper, upper)
         try:
             met = meet_sets(*self._held.body, *self._transferable(other))
-            self._hold(self._settled(Held((self._held.body[0], *met), *box)))
+            self._hold(self._settled((self._held.body[0], *met), *box))
         except InconsistentData as contradiction:
             raise InconsistentData(
                 f"the set of {self.kind} and the transferred set have no point in common"
@@ -172,8 +180,9 @@ class LSUCZ(Filter):
     def reset(self, support: Support) -> None:
         """Start again from a set that is known to hold the state now."""
         given = checked_prior(self._model, support)
-        held = Held(given.to_constrained_zonotope().arrays, *map(np.array, given.bounds()))
-        self._hold(held if self._is_within_limits(held) else self._settled(held))
+        body = given.to_constrained_zonotope().arrays
+        lower, upper = given.bounds()
+        self._hold(Held(body, lower, upper, True) if self._limits.allow(body) else self._settled(body, lower, upper))
 
     def snapshot(self) -> Held:
         """The set and the box; neither is ever written again."""
@@ -187,33 +196,27 @@ class LSUCZ(Filter):
 
     def _hold(self, held: Held) -> None:
         self._held = held
-        self._support: ConstrainedZonotope | None = None
-        self._bounds: tuple[Vector, Vector] | None = None
+        self._support = None
+        self._bounds = None
 
-    def _is_within_limits(self, held: Held) -> bool:
-        return not exceeds(*held.body[2].shape[::-1], *self._limits)
-
-    def _settled(self, held: Held) -> Held:
+    def _settled(self, body: Body, lower: Vector, upper: Vector) -> Held:
         """Hull, then reduction; raises ``InconsistentData`` where the set is proved empty."""
-        status, body, lower, upper = lsucz.settle(*held.body, held.lower, held.upper, *self._limits)
-        if status == hull.LOOSE:  # the bounds are true; another solver may know better ones
-            tighter = ConstrainedZonotope.of_arrays(*held.body).bounds()
-            lower, upper = np.maximum(lower, tighter[0]), np.minimum(upper, tighter[1])
-        if status == hull.EMPTY or (lower > upper).any():
+        settled = settle(body, lower, upper, self._limits)
+        if settled.empty:
             raise InconsistentData("the sets are proved to have no point in common")
-        return Held(body, lower, upper)
+        return Held(settled.body, settled.lower, settled.upper, is_hull=True)
 
     def _transferable(self, other: Support) -> Body:
         """The other set's arrays, or those of its box where it is far more complex than this filter's own."""
         joined = other.to_constrained_zonotope()
-        limit = self._limits[0]
-        if limit >= 0 and joined.generator_count > 3 * max(limit, self._model.state_count):
+        limit = self._limits.generators
+        if limit is not None and joined.generator_count > 3 * max(limit, self._model.state_count):
             joined = other.interval_hull().to_constrained_zonotope()
         return joined.arrays
 
     def _noiseless_output(self) -> tuple[Vector, Vector]:
         low, high = self.support.ranges(self._arrays.C)
-        box_low, box_high = lsucz.image_of_box(self._arrays.C, *self.bounds())
+        box_low, box_high = image_of_box(self._arrays.C, *self.bounds())
         return np.maximum(low, box_low), np.minimum(high, box_high)
 
     def _explained(self, y: Vector, r: Vector) -> InconsistentData:
@@ -243,7 +246,7 @@ def _within(held: Held, domain: Orthotope) -> Held:
         body = (c, *meet_strips(c, G, A, b, np.eye(domain.dim), middle, np.array(domain.half_widths)))
     if (lower > upper).any() or ConstrainedZonotope.of_arrays(*body).is_empty():
         raise InconsistentData("the prediction is proved to miss the domain")
-    return Held(body, lower, upper)
+    return Held(body, lower, upper, is_hull=False)
 
 
 def _log_ratio(before: Vector, after: Vector) -> float:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound
-from lsu_mesh.kernels.rounding import down, up
 from lsu_mesh.kernels.simplex import (
     basic_levels,
     canonical_tableau,
@@ -89,19 +88,16 @@ def maximise(program: Program, d: Array, point: Array) -> tuple[float, bool]:
 
 
 @kernel
-def safe_maxima(D: Array, A: Array, b: Array) -> tuple[int, Array, Array]:
-    """Upper bounds of ``max {d'ξ : A ξ = b, |ξ|∞ ≤ 1}`` for the rows d of D (k, g).
+def maxima(program: Program, D: Array) -> tuple[int, Array, Array]:
+    """Safe upper bounds (k,) of the objectives in the rows of D (k, g), and points (k, g) that attain them to rounding.
 
-    Returns the status, the bounds (k,), rounded up, and points (k, g) that attain them in floating point. The bounds
-    are true whatever the status; on ``EMPTY`` they mean nothing. Objectives are solved in order, each from the last
-    vertex, the first from a canonical one, so that the same arrays give the same bits.
+    The bounds are true whatever the status, ``TIGHT`` or ``LOOSE``. Objectives are solved in order, each from the last
+    vertex, so that a program just opened and the same D give the same bits.
     """
     k, g = D.shape
     values = np.empty(k)
     points = np.empty((k, g))
-    status, program = open_program(A, b)
-    if status == EMPTY:
-        return EMPTY, values, points
+    status = TIGHT
     for t in range(k):
         values[t], tight = maximise(program, D[t], points[t])
         if not tight:
@@ -110,40 +106,15 @@ def safe_maxima(D: Array, A: Array, b: Array) -> tuple[int, Array, Array]:
 
 
 @kernel
-def interval_hull(program: Program, c: Array, G: Array, lower: Array, upper: Array, points: Array) -> int:
-    """Meet the box [lower, upper] (n,), in place, with the hull of ``{c + G ξ}``; status.
-
-    ``points`` (2n, g) receives the ξ that attain the upper, then the lower sides.
-    """
-    n, g = G.shape
-    status = TIGHT
-    d = np.empty(g)
-    for t in range(2 * n):
-        i = t if t < n else t - n
-        sign = 1.0 if t < n else -1.0
-        for j in range(g):
-            d[j] = sign * G[i, j]
-        value, tight = maximise(program, d, points[t])
-        if not tight:
-            status = LOOSE
-        if t < n:
-            upper[i] = min(upper[i], up(c[i] + value))
-        else:
-            lower[i] = max(lower[i], down(c[i] - value))
-    for i in range(n):
-        if lower[i] > upper[i]:
-            return EMPTY
-    return status
-
-
-@kernel
-def variable_ranges(program: Program, points: Array, low: Array, high: Array) -> None:
-    """Ranges [low, high] (g,) of the ξ_j over the set, rounded outward and within [−1, 1].
+def variable_ranges(program: Program, points: Array) -> tuple[Array, Array]:
+    """Ranges low, high (g,) of the ξ_j over the set, rounded outward and within [−1, 1].
 
     A feasible point with ξ_j = ±1 shows that this side cannot be tightened: ``points`` (k, g), and the vertices met on
     the way, save most of the 2g programs.
     """
-    g = low.size
+    g = points.shape[1]
+    low = np.empty(g)
+    high = np.empty(g)
     for j in range(g):
         low[j], high[j] = 1.0, -1.0
         for t in range(points.shape[0]):
@@ -172,13 +143,7 @@ def variable_ranges(program: Program, points: Array, low: Array, high: Array) ->
             high[j] = 1.0
         if low[j] <= -touching:
             low[j] = -1.0
-
-
-@kernel
-def proves_empty(A: Array, b: Array) -> tuple[bool, bool]:
-    """Whether ``{ξ : A ξ = b, |ξ|∞ ≤ 1}`` is proved empty, and whether the simplex came to its end."""
-    status, _ = open_program(A, b)
-    return status == EMPTY, status != LOOSE
+    return low, high
 
 
 @kernel

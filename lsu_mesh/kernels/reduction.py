@@ -1,6 +1,6 @@
 """Outer approximation of a constrained zonotope by one of limited complexity (Scott et al. 2016, §4; P2023 §3.1).
 
-1. The ranges of all ξ_j over the set are found by linear programs and the variables are rescaled to them: that changes
+1. The variables are rescaled to their ranges over the set, which linear programs have found: that changes
    nothing in the set, and a variable forgotten or a column boxed later then costs what it really spans.
 2. Constraints are eliminated, the least harmful first, each with one generator.
 3. Generators of the lifted zonotope are reduced, and all rounding is enclosed.
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.constrained import absorb_rows
 from lsu_mesh.kernels.elimination import drop_constraint
-from lsu_mesh.kernels.hull import Program, variable_ranges
 from lsu_mesh.kernels.lifted import (
     lift,
     rescale_variables,
@@ -29,31 +28,22 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def exceeds(g: int, m: int, max_generators: int, max_constraints: int) -> bool:
-    """Whether g generators and m constraints are more than allowed; −1 is no limit."""
-    return 0 <= max_generators < g or 0 <= max_constraints < m
-
-
-@kernel
 def reduce_complexity(
     c: Array,
     G: Array,
     A: Array,
     b: Array,
-    program: Program,
-    points: Array,
+    low: Array,
+    high: Array,
     max_generators: int,
     max_constraints: int,
 ) -> tuple[Array, Array, Array, Array]:
     """A set with at most so many generators and constraints that contains ``(c, G, A, b)``; −1 is no limit.
 
-    ``program`` is that of (A, b), ``points`` (k, g) are feasible ξ already known. ``max_generators ≥ n``; constraints are
-    given up where n + m would exceed it.
+    ``low``, ``high`` (g,): ranges of the ξ_j over the set. ``max_generators ≥ n``; constraints are given up where n + m
+    would exceed it. Without a limit of generators the rounding may add some.
     """
-    n, g = G.shape
-    low = np.empty(g)
-    high = np.empty(g)
-    variable_ranges(program, points, low, high)
+    n = c.size
     L, middle, slack = lift(c, G, A, b)
     rescale_variables(L, middle, slack, low, high)
     L = without_zero_columns(L)

@@ -181,7 +181,7 @@ def parallelotope_volumes(G: Array) -> float:
         while k >= 0 and chosen[k] == g - n + k:
             k -= 1
         if k < 0:
-            return total * 2.0**n
+            return float(total * 2.0**n)
         chosen[k] += 1
         for j in range(k + 1, n):
             chosen[j] = chosen[j - 1] + 1

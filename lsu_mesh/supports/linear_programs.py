@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels import hull
 from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound
+from lsu_mesh.kernels.hull import EMPTY, LOOSE, Program, maxima, open_program
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -27,8 +27,15 @@ class Maxima(NamedTuple):
 
 def safe_maxima(objectives: Matrix, A: Matrix, b: Vector) -> Maxima:
     """``max {d'ξ : A ξ = b, |ξ|∞ ≤ 1}`` for each row d of ``objectives`` (k, g), never below the exact value."""
-    status, values, points = hull.safe_maxima(objectives, A, b)
-    if status == hull.LOOSE:
+    return program_maxima(*open_program(A, b), objectives, A, b)
+
+
+def program_maxima(status: int, program: Program, objectives: Matrix, A: Matrix, b: Vector) -> Maxima:
+    """:func:`safe_maxima` with the program of (A, b) opened already, with this status; leaves it at the last vertex."""
+    if status == EMPTY:
+        return Maxima(np.full(objectives.shape[0], -np.inf), np.zeros(objectives.shape), True)
+    solved, values, points = maxima(program, objectives)
+    if LOOSE in (status, solved):
         if _highs_proves_empty(A, b):
             return Maxima(values, points, True)
         sums = absolute_row_sums(A)
@@ -37,15 +44,15 @@ def safe_maxima(objectives: Matrix, A: Matrix, b: Vector) -> Maxima:
             bound = dual_bound(np.array(d), A, b, sums, multipliers)
             if bound < values[i]:
                 values[i], points[i] = bound, point
-    return Maxima(values, points, status == hull.EMPTY)
+    return Maxima(values, points, False)
 
 
 def is_proved_empty(A: Matrix, b: Vector) -> bool:
     """Whether ``{ξ : A ξ = b, |ξ|∞ ≤ 1}`` is empty, ``True`` only with a verified Farkas ray."""
     if A.shape[0] == 0:
         return False
-    empty, decided = hull.proves_empty(A, b)
-    return bool(empty) or (not decided and _highs_proves_empty(A, b))
+    status, _ = open_program(A, b)
+    return bool(status == EMPTY) or (status == LOOSE and _highs_proves_empty(A, b))
 
 
 def _highs(d: Vector, A: Matrix, b: Vector) -> tuple[Vector, Vector]:

@@ -1,4 +1,4 @@
-"""The steps of LSU-CZ on plain arrays: a constrained zonotope (c, G, A, b) and a box [lower, upper] that hold the state."""
+"""The time update of LSU-CZ on plain arrays: a constrained zonotope (c, G, A, b) and a box [lower, upper]."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
-from lsu_mesh.kernels.hull import EMPTY, interval_hull, open_program
-from lsu_mesh.kernels.reduction import exceeds, reduce_complexity
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
 from lsu_mesh.kernels.zonotope import absorb_box, padded
 
@@ -16,35 +14,7 @@ Body = tuple[Array, Array, Array, Array]
 
 
 @kernel
-def settle(
-    c: Array,
-    G: Array,
-    A: Array,
-    b: Array,
-    lower: Array,
-    upper: Array,
-    max_generators: int,
-    max_constraints: int,
-) -> tuple[int, Body, Array, Array]:
-    """Interval hull of the set met with the box, then reduction to the limits (−1: none).
-
-    Returns the status of the hull, the set, and the sides of the box (n,), (n,). On ``EMPTY`` the rest means nothing.
-    """
-    n, g = G.shape
-    low = lower.copy()
-    high = upper.copy()
-    status, program = open_program(A, b)
-    if status == EMPTY:
-        return EMPTY, (c, G, A, b), low, high
-    points = np.empty((2 * n, g))
-    status = max(status, interval_hull(program, c, G, low, high, points))
-    if status != EMPTY and exceeds(g, A.shape[0], max_generators, max_constraints):
-        c, G, A, b = reduce_complexity(c, G, A, b, program, points, max_generators, max_constraints)
-    return status, (c, G, A, b), low, high
-
-
-@kernel
-def predict(
+def predict_constrained(
     body: Body, lower: Array, upper: Array, R: Array, B: Array, u: Array, N: Array, widths: Array
 ) -> tuple[bool, Body, Array, Array]:
     """Time update ``R X ⊕ B u ⊕ N box(widths)``; R (n, n), B (n, p), u (p,), N (n, q), widths (q,).
