@@ -19,7 +19,7 @@ from lsu_mesh.filters.arguments import (
     same_states,
 )
 from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.kernels import step
+from lsu_mesh.kernels import loops, step
 from lsu_mesh.kernels.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -99,9 +99,10 @@ class CompiledFilter(Filter):
         widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
         work = self._work if widths.size == self._arrays.G.shape[1] else self._scratch(widths.size)
         state = np.empty_like(self._state)
-        status = step.predict(
-            self.family, self.option, self._state, arrays.A, arrays.B, center, arrays.G, widths, state, work
-        )
+        status = step.advance(
+            step.PREDICT, self.family, self.option, self._state, self._arrays.C, center, center,
+            arrays.A, arrays.B, center, arrays.G, widths, state, work,
+        )  # fmt: skip
         if status == 0 and step_model.domain is not None:
             state, status = self._meet_box(state, step_model.domain)
             if status > 0:
@@ -132,17 +133,54 @@ class CompiledFilter(Filter):
     def restore(self, snapshot: object) -> None:
         self._state = cast("Matrix", snapshot)
 
+    @property
+    def has_compiled_loop(self) -> bool:
+        """Whether :meth:`sweep` does what the steps one by one would do."""
+        return True
+
+    def sweep(self, Y: Matrix, U: Matrix, record: loops.Record) -> tuple[int, int]:
+        """Update and predict for all rows of Y (T, m), U (T, p) in one compiled loop; ``record`` with a leading axis 1.
+
+        Returns the rows that are done, and where it stopped (``kernels/loops.py``); the filter holds the last good state.
+        """
+        a = self._arrays
+        domain = self._model.domain
+        models = loops.Models(
+            A=a.A[np.newaxis],
+            B=a.B[np.newaxis],
+            C=a.C[np.newaxis],
+            G=a.G[np.newaxis],
+            widths=np.concatenate([a.rho, np.zeros(a.B.shape[1])])[np.newaxis],
+            r=a.r[np.newaxis],
+            domains=np.zeros((1, 0, len(a.A))) if domain is None else np.array([domain.bounds()]),
+        )
+        states, outcome = self._state[np.newaxis].copy(), np.zeros((1, 2), dtype=np.int64)
+        loops.sweep(
+            self.family, self.option, True, False, states, np.empty_like(self._state), models,
+            Y[np.newaxis], U[np.newaxis], record, outcome, 0, 1, self._work,
+        )  # fmt: skip
+        self._state = states[0]
+        return int(outcome[0, 0]), int(outcome[0, 1])
+
     def _scratch(self, noise_columns: int) -> Scratch:
         return scratch(self._model.state_count, noise_columns)
 
-    def _cut(self, state: Matrix, C: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
-        new = np.empty_like(state)
-        return new, step.update(self.family, self.option, state, C, y, r, new, self._work)
+    def _cut(self, state: Matrix, P: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
+        """The part of ``state`` in the strips ``|y − P x| ≤ r``, and the status of the kernel."""
+        return self._restrict(step.UPDATE, state, P, y, r)
 
     def _meet_box(self, state: Matrix, box: Orthotope) -> tuple[Matrix, int]:
+        """The part of ``state`` in a box, and the status of the kernel."""
+        return self._restrict(step.MEET_BOX, state, self._arrays.C, np.array(box.lower), np.array(box.upper))
+
+    def _restrict(self, action: int, state: Matrix, P: Matrix, first: Vector, second: Vector) -> tuple[Matrix, int]:
         new = np.empty_like(state)
-        lower, upper = np.array(box.lower), np.array(box.upper)
-        return new, step.meet_box(self.family, state, lower, upper, new, self._work)
+        a = self._arrays
+        status = step.advance(
+            action, self.family, self.option, state, P, first, second,
+            a.A, a.B, a.rho, a.G, a.rho, new, self._work,
+        )  # fmt: skip
+        return new, status
 
     def _describe(self, state: Matrix) -> tuple[Vector, Vector, Vector, float]:
         n = self._model.state_count

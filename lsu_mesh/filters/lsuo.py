@@ -52,6 +52,10 @@ class LSUO(CompiledFilter):
         self.meet = bool(meet)
         self.hull = hull
 
+    @property
+    def has_compiled_loop(self) -> bool:
+        return self.hull == "strips"
+
     @staticmethod
     def _enclose(support: Support) -> Matrix:
         return np.array(support.bounds())

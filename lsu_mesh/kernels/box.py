@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
 from lsu_mesh.kernels.scratch import BODY, BOX, DELTA, STRIP, Scratch
 from lsu_mesh.kernels.strip import EMPTY, OVERFLOW, STRIP_ROWS, TIGHTENED, UNCHANGED, cut, half_width, hull, middle
@@ -98,20 +98,6 @@ def update(
 
 
 @kernel
-def meet_box(
-    lower: Vector, upper: Vector, other_lower: Vector, other_upper: Vector, new_lower: Vector, new_upper: Vector
-) -> int:
-    """Intersection of two boxes, exact; returns 0, or i + 1 where coordinate i leaves nothing."""
-    status = 0
-    for i in range(lower.size):
-        new_lower[i] = max(lower[i], other_lower[i])
-        new_upper[i] = min(upper[i], other_upper[i])
-        if new_lower[i] > new_upper[i] and status == 0:
-            status = i + 1
-    return status
-
-
-@kernel
 def tighten(lower: Vector, upper: Vector, p: Vector, lo: float, hi: float) -> int:
     """Exact interval hull of the box and the strip ``lo ≤ p'x ≤ hi``, rounded outward, in place.
 
@@ -151,7 +137,7 @@ def tighten(lower: Vector, upper: Vector, p: Vector, lo: float, hi: float) -> in
     return status
 
 
-@kernel
+@inner
 def volume(lower: Vector, upper: Vector) -> float:
     """``Π (upper − lower)``."""
     product = 1.0

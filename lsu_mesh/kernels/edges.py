@@ -1,7 +1,7 @@
 """Time updates that choose the edges of the enclosing parallelotope among those of ``A P`` and of the noise.
 
-The candidates are the columns of ``[T  G diag(widths)]``. Which of them become edges is found in plain floating point; the
-zonotope is then enclosed along these edges and verified as any other (``kernels/enclosure.py``).
+The candidates are the columns of ``[T  G diag(widths)]``. Which of them become edges is found in plain floating point;
+the zonotope is then enclosed along these edges and verified as any other (``kernels/enclosure.py``).
 """
 
 from __future__ import annotations
@@ -11,80 +11,62 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
-from lsu_mesh.kernels.enclosure import enclose
+from lsu_mesh.kernels.compile import inner
 from lsu_mesh.kernels.linear_algebra import invert, log_abs_determinant
 from lsu_mesh.kernels.rounding import EPSILON, up
-from lsu_mesh.kernels.scratch import BASIS, FACTOR, INVERSE, Scratch
+from lsu_mesh.kernels.scratch import BASIS, BEST, CANDIDATES, CHOSEN, ENCLOSE, FACTOR, INVERSE, Scratch
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-@kernel
-def enclose_by_swaps(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
-    """``T ← T'`` around ``T ⊕ G diag(widths) ⊕ box(delta)``: one noise generator at a time takes the place of an edge, or
-    of none, whichever leaves the least volume. Source: Chisci, Garulli & Zappa 1996, theorem 1.
+@inner
+def choose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, exhaustive: bool, work: Scratch) -> None:
+    """Edges that leave little volume: greedy swaps, or ``exhaustive`` the best n of all candidates.
+
+    Afterwards T holds the chosen edges; page ``CANDIDATES`` and ``weights`` (of length n + q) of the scratch hold the
+    other generators of ``T ⊕ G diag(widths)``; the rounding of the products went to delta.
+    Source: Chisci, Garulli & Zappa 1996, theorem 1.
     """
-    n = T.shape[0]
-    edges, inverse = work.squares[BASIS], work.squares[INVERSE]
-    _list_candidates(T, G, widths, work)
-    for j in range(n):
-        work.chosen[j] = j
-        for i in range(n):
-            edges[i, j] = T[i, j]
-    for q in range(n, n + widths.size):
-        if widths[q - n] > 0.0:
-            if not invert(edges, inverse, work.squares[FACTOR]):
-                return enclose(T, G, widths, delta, work)
-            _swap(edges, inverse, work.candidates, q, work.vectors[0], work.chosen)
-    return _enclose_chosen(T, widths.size, delta, work.chosen, work)
-
-
-@kernel
-def enclose_along_best_edges(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
-    """``T ← T'`` around ``T ⊕ G diag(widths) ⊕ box(delta)`` along those n of all candidates that leave the least volume."""
     n, count = T.shape[0], T.shape[0] + widths.size
-    _list_candidates(T, G, widths, work)
-    least = math.inf
-    for j in range(n):
-        work.chosen[j] = j
-    while True:
-        volume = _log_volume_along(work.chosen, count, work)
-        if volume < least:
-            least = volume
-            for j in range(n):
-                work.best[j] = work.chosen[j]
-        if not _next_combination(work.chosen, count):
-            break
-    if least == math.inf:
-        return enclose(T, G, widths, delta, work)
-    return _enclose_chosen(T, widths.size, delta, work.best, work)
-
-
-@kernel
-def _list_candidates(T: Matrix, G: Matrix, widths: Vector, work: Scratch) -> None:
-    n = T.shape[0]
+    candidates, chosen = work.pages[CANDIDATES], work.picks[CHOSEN]
+    edges, inverse, factor = work.squares[BASIS], work.squares[INVERSE], work.squares[FACTOR]
     for i in range(n):
+        chosen[i] = i
+        rounded = 0.0
         for j in range(n):
-            work.candidates[i, j] = T[i, j]
+            candidates[i, j], edges[i, j] = T[i, j], T[i, j]
         for j in range(widths.size):
-            work.candidates[i, n + j] = G[i, j] * widths[j]
+            candidates[i, n + j] = G[i, j] * widths[j]
+            rounded += abs(candidates[i, n + j])
+        delta[i] = up(delta[i] + EPSILON * rounded)
+    if exhaustive:
+        _find_best(candidates, count, chosen, work.picks[BEST], edges, inverse, factor)
+    else:
+        for q in range(n, count):
+            if widths[q - n] > 0.0 and invert(edges, inverse, factor):
+                _swap(edges, inverse, candidates, q, work.vectors[ENCLOSE], chosen)
+    for q in range(count):
+        work.weights[q] = 1.0
+    for j in range(n):
+        work.weights[chosen[j]] = 0.0
+        for i in range(n):
+            T[i, j] = candidates[i, chosen[j]]
 
 
-@kernel
+@inner
 def _swap(edges: Matrix, inverse: Matrix, candidates: Matrix, q: int, alpha: Vector, chosen: Indices) -> None:
     """Enclose ``edges ⊕ candidate q``: all edges grow by ``1 + |α_j|``, ``α = edges⁻¹ g``, or g replaces edge k."""
     n = alpha.size
-    keep = 0.0
+    least = 0.0
     for j in range(n):
         entry = 0.0
         for i in range(n):
             entry += inverse[j, i] * candidates[i, q]
         alpha[j] = abs(entry)
-        keep += math.log(1.0 + alpha[j])
-    dropped, least = -1, keep
+        least += math.log(1.0 + alpha[j])
+    dropped = -1
     for k in range(n):
         if alpha[k] > 0.0:
             volume = math.log(alpha[k] + 1.0) - (n - 1) * math.log(alpha[k])
@@ -104,29 +86,49 @@ def _swap(edges: Matrix, inverse: Matrix, candidates: Matrix, q: int, alpha: Vec
                 edges[i, j] *= growth
 
 
-@kernel
-def _log_volume_along(chosen: Indices, count: int, work: Scratch) -> float:
-    """Logarithm of ``|det V| Π_j Σ_q |V⁻¹ g_q|_j`` for the chosen columns V; inf where they are dependent."""
+@inner
+def _find_best(
+    candidates: Matrix, count: int, chosen: Indices, best: Indices, edges: Matrix, inverse: Matrix, factor: Matrix
+) -> None:
+    """The combination ``chosen`` of the first ``count`` candidates that leaves the least volume; starts from itself."""
     n = chosen.size
-    edges, inverse = work.squares[BASIS], work.squares[INVERSE]
+    least = math.inf
     for j in range(n):
-        for i in range(n):
-            edges[i, j] = work.candidates[i, chosen[j]]
-    if not invert(edges, inverse, work.squares[FACTOR]):
+        best[j] = chosen[j]
+    searching = True
+    while searching:
+        for j in range(n):
+            for i in range(n):
+                edges[i, j] = candidates[i, chosen[j]]
+        volume = _log_volume_along(edges, candidates, count, inverse, factor)
+        if volume < least:
+            least = volume
+            for j in range(n):
+                best[j] = chosen[j]
+        searching = _next_combination(chosen, count)
+    for j in range(n):
+        chosen[j] = best[j]
+
+
+@inner
+def _log_volume_along(edges: Matrix, candidates: Matrix, count: int, inverse: Matrix, factor: Matrix) -> float:
+    """Logarithm of ``|det V| Π_j Σ_q |V⁻¹ g_q|_j`` for the edges V; inf where they are dependent."""
+    n = edges.shape[0]
+    if not invert(edges, inverse, factor):
         return math.inf
-    volume = log_abs_determinant(edges, work.squares[FACTOR])
+    volume = log_abs_determinant(edges, factor)
     for j in range(n):
         reach = 0.0
         for q in range(count):
             entry = 0.0
             for i in range(n):
-                entry += inverse[j, i] * work.candidates[i, q]
+                entry += inverse[j, i] * candidates[i, q]
             reach += abs(entry)
         volume += math.log(reach)
     return volume if math.isfinite(volume) else math.inf
 
 
-@kernel
+@inner
 def _next_combination(chosen: Indices, count: int) -> bool:
     """The next n of ``count`` indices in lexicographic order; ``False`` after the last."""
     n = chosen.size
@@ -139,22 +141,3 @@ def _next_combination(chosen: Indices, count: int) -> bool:
     for i in range(j + 1, n):
         chosen[i] = chosen[i - 1] + 1
     return True
-
-
-@kernel
-def _enclose_chosen(T: Matrix, noise_count: int, delta: Vector, chosen: Indices, work: Scratch) -> bool:
-    """Enclose all candidates along the chosen ones; the rounding of ``G diag(widths)`` goes to delta."""
-    n = T.shape[0]
-    count = n + noise_count
-    for i in range(n):
-        rounded = 0.0
-        for q in range(n, count):
-            rounded += abs(work.candidates[i, q])
-        delta[i] = up(delta[i] + EPSILON * rounded)
-    for q in range(work.weights.size):
-        work.weights[q] = 1.0 if q < count else 0.0
-    for j in range(n):
-        work.weights[chosen[j]] = 0.0
-        for i in range(n):
-            T[i, j] = work.candidates[i, chosen[j]]
-    return enclose(T, work.candidates, work.weights, delta, work)

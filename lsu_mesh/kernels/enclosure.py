@@ -14,10 +14,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.linear_algebra import invert, orthogonal_basis
 from lsu_mesh.kernels.rounding import UNDERFLOW, UNIT_ROUNDOFF, gamma, up
-from lsu_mesh.kernels.scratch import BASIS, ENCLOSE, FACTOR, INVERSE, Scratch
+from lsu_mesh.kernels.scratch import BASIS, COLUMNS, ENCLOSE, FACTOR, INVERSE, Scratch
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
@@ -30,7 +30,7 @@ LARGEST_RESIDUAL = 0.25
 def enclose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
     """``T ← T'`` with ``T'[−1,1]ⁿ ⊇ T[−1,1]ⁿ ⊕ G diag(widths)[−1,1]^q ⊕ box(delta)``, in place.
 
-    T (n, n), G (n, q), widths (q,), delta (n,). ``False`` where the result is not finite.
+    T (n, n), G (n, q or more), widths (q,), delta (n,). ``False`` where the result is not finite.
     """
     return enclose_along_edges(T, G, widths, delta, work) or enclose_orthogonally(T, G, widths, delta, work)
 
@@ -52,8 +52,8 @@ def enclose_along_edges(T: Matrix, G: Matrix, widths: Vector, delta: Vector, wor
 @kernel
 def enclose_orthogonally(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
     """As :func:`enclose`, with new edges: an orthogonal basis, the longest columns first, in row-scaled coordinates."""
-    n, q = G.shape
-    basis, inverse, columns = work.squares[BASIS], work.squares[INVERSE], work.columns
+    n, q = T.shape[0], widths.size
+    basis, inverse, columns = work.squares[BASIS], work.squares[INVERSE], work.pages[COLUMNS]
     grown, own, scale = work.vectors[ENCLOSE], work.vectors[ENCLOSE + 1], work.vectors[ENCLOSE + 2]
     for i in range(n):
         size = delta[i]
@@ -81,13 +81,13 @@ def enclose_orthogonally(T: Matrix, G: Matrix, widths: Vector, delta: Vector, wo
     return _grow(basis, inverse, grown, own, work, T)
 
 
-@kernel
+@inner
 def inflate(x: float, operations: int) -> float:
     """x ≥ 0 rounded up by the relative error of as many operations on non-negative numbers; 0 stays 0."""
     return x + gamma(operations) * x + UNDERFLOW if x > 0.0 else 0.0
 
 
-@kernel
+@inner
 def residual_row(M: Matrix, V: Matrix, i: int) -> float:
     """``Σ_j |I − M V|_ij``, rounded up."""
     n = V.shape[0]
@@ -102,7 +102,7 @@ def residual_row(M: Matrix, V: Matrix, i: int) -> float:
     return inflate(total + gamma(n + 3) * magnitude, n * n + n + 6)
 
 
-@kernel
+@inner
 def _power_of_two(size: float) -> float:
     """The power of two at or below size (division by it is exact); 1 for 0 and for extreme sizes."""
     if not (1e-290 < size < 1e290):
@@ -110,10 +110,10 @@ def _power_of_two(size: float) -> float:
     return math.ldexp(0.5, math.frexp(size)[1])
 
 
-@kernel
+@inner
 def _noise_reach(M: Matrix, i: int, G: Matrix, widths: Vector, delta: Vector) -> float:
     """``Σ_q |(M G)_iq| widths_q + (|M| delta)_i``, rounded up."""
-    n, q = G.shape
+    n, q = M.shape[0], widths.size
     reach, magnitude = 0.0, 0.0
     for j in range(q):
         if widths[j] > 0.0:
@@ -129,7 +129,7 @@ def _noise_reach(M: Matrix, i: int, G: Matrix, widths: Vector, delta: Vector) ->
     return inflate(reach + gamma(n + 2) * magnitude, 2 * n + q + 8)
 
 
-@kernel
+@inner
 def _edge_reach(M: Matrix, i: int, T: Matrix) -> float:
     """``Σ_j |(M T)_ij|``, rounded up."""
     n = T.shape[0]
@@ -144,7 +144,7 @@ def _edge_reach(M: Matrix, i: int, T: Matrix) -> float:
     return inflate(reach + gamma(n + 2) * magnitude, n * n + n + 6)
 
 
-@kernel
+@inner
 def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Matrix) -> bool:
     """``T ← V diag(own + z)`` where ``z ≥ |V⁻¹ e|`` for every e whose ``|M e| ≤ grown``; V and T may be the same.
 
@@ -182,7 +182,7 @@ def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Ma
     return True
 
 
-@kernel
+@inner
 def _solve_bound(b: Vector, residual: Vector, largest: float, z: Vector) -> None:
     """``z_i = b_i + ρ_i max(b)/(1 − max(ρ))``, rounded up."""
     greatest = 0.0

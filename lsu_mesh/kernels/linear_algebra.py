@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
@@ -90,7 +90,7 @@ def orthogonal_basis(columns: Matrix, count: int, basis: Matrix) -> None:
                 columns[i, j] -= along * basis[i, d]
 
 
-@kernel
+@inner
 def _orthonormalise(basis: Matrix, d: int) -> None:
     n = basis.shape[0]
     for _ in range(2):
@@ -108,7 +108,7 @@ def _orthonormalise(basis: Matrix, d: int) -> None:
             basis[i, d] /= length
 
 
-@kernel
+@inner
 def _complete(basis: Matrix, d: int) -> None:
     """Direction d is the coordinate axis that the first d directions span least."""
     n = basis.shape[0]

@@ -1,4 +1,4 @@
-"""Whole runs, and banks of independent filters, over the steps of ``kernels/step.py``."""
+"""Whole runs of whole banks of independent filters, over the step of ``kernels/step.py``."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.scratch import Scratch
-from lsu_mesh.kernels.step import describe, meet_box, predict, predict_output, update
+from lsu_mesh.kernels.step import MEET_BOX, PREDICT, UPDATE, advance, copy, describe, predict_output
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
@@ -20,110 +20,81 @@ IN_UPDATE = 1
 IN_PREDICT = 2
 
 
-class Record(NamedTuple):
-    """What a run stores of each step: points, lower, upper (T, n), volumes (T,), y_lower, y_upper, y_points (T, m)."""
+class Models(NamedTuple):
+    """Models of a bank: A (M, n, n), B (M, n, p), C (M, m, n), G (M, n, q), widths (M, q), r (M, m), domains (M, 2, n).
 
-    points: Matrix
-    lower: Matrix
-    upper: Matrix
-    volumes: Vector
-    y_lower: Matrix
-    y_upper: Matrix
-    y_points: Matrix
-
-
-@kernel
-def run(
-    family: int, option: int, S: Matrix, spare: Matrix,
-    A: Matrix, B: Matrix, C: Matrix, G: Matrix, widths: Vector, r: Vector,
-    domain: Matrix, Y: Matrix, U: Matrix, record: Record, work: Scratch,
-) -> tuple[int, int]:  # fmt: skip
-    """Steps 1 … T: predict the output, update with ``Y[k]``, record, predict with ``U[k]`` (not after the last row).
-
-    S holds the prior at first and at last the state of the step at which the run ended. ``domain`` is (2, n), or (0, n) for
-    none. Returns the rows that are done and ``DONE``, or where it stopped: ``IN_UPDATE`` (S is the prediction of that row) or
-    ``IN_PREDICT`` (S is its posterior).
+    M = N, or M = 1 for all instances alike; domains (M, 0, n) where there is none.
     """
-    for k in range(Y.shape[0]):
-        predict_output(family, S, C, r, record.y_lower[k], record.y_upper[k], record.y_points[k], work)
-        if update(family, option, S, C, Y[k], r, spare, work) != 0:
-            return k, IN_UPDATE
-        _copy(spare, S)
-        record.volumes[k] = describe(family, S, record.points[k], record.lower[k], record.upper[k], work)
-        if k + 1 < Y.shape[0] and not _advance(family, option, S, spare, A, B, G, widths, domain, U[k], work):
-            return k + 1, IN_PREDICT
-    return Y.shape[0], DONE
+
+    A: Stack
+    B: Stack
+    C: Stack
+    G: Stack
+    widths: Matrix
+    r: Matrix
+    domains: Stack
+
+
+class Record(NamedTuple):
+    """What a run stores: points, lower, upper (N, T, n), volumes (N, T), y_lower, y_upper, y_points (N, T, m)."""
+
+    points: Stack
+    lower: Stack
+    upper: Stack
+    volumes: Matrix
+    y_lower: Stack
+    y_upper: Stack
+    y_points: Stack
 
 
 @kernel
-def _advance(
-    family: int, option: int, S: Matrix, spare: Matrix,
-    A: Matrix, B: Matrix, G: Matrix, widths: Vector, domain: Matrix, u: Vector, work: Scratch,
+def sweep(
+    family: int, option: int, updating: bool, last_prediction: bool, states: Stack, spare: Matrix, models: Models,
+    Y: Stack, U: Stack, record: Record, outcome: NDArray[np.int64], first: int, last: int, work: Scratch,
+) -> None:  # fmt: skip
+    """Rows 1 … T of the instances first … last − 1, whose states (N, rows, n) go from the prior to the last one.
+
+    Each row: predict the output, update with ``Y[i, k]``, record (all three only where ``updating``); then, but after the
+    last row only with ``last_prediction``, predict with ``U[i, k]``. ``outcome`` (N, 2): the rows that are done, and
+    ``DONE`` or where it stopped: ``IN_UPDATE`` (the state is the prediction of that row) or ``IN_PREDICT`` (the state is the
+    posterior of the row before). Y (N, T, m), U (N, T, p); spare (rows, n) and work are scratch.
+    """
+    rows = Y.shape[1]
+    for i in range(first, last):
+        j = i % models.A.shape[0]
+        C, r, S = models.C[j], models.r[j], states[i]
+        outcome[i, 0], outcome[i, 1] = rows, DONE
+        for k in range(rows):
+            if updating:
+                predict_output(family, S, C, r, record.y_lower[i, k], record.y_upper[i, k], record.y_points[i, k], work)
+                if not _step(UPDATE, family, option, S, spare, models, j, Y[i, k], U[i, k], work):
+                    outcome[i, 0], outcome[i, 1] = k, IN_UPDATE
+                    break
+                record.volumes[i, k] = describe(
+                    family, S, record.points[i, k], record.lower[i, k], record.upper[i, k], work
+                )
+            if (k + 1 < rows or last_prediction) and not _step(
+                PREDICT, family, option, S, spare, models, j, Y[i, k], U[i, k], work
+            ):
+                outcome[i, 0], outcome[i, 1] = k + 1, IN_PREDICT
+                break
+
+
+@inner
+def _step(
+    action: int, family: int, option: int, S: Matrix, spare: Matrix, models: Models, j: int,
+    y: Vector, u: Vector, work: Scratch,
 ) -> bool:  # fmt: skip
-    """Time update and meet with the domain; S is kept where it fails."""
-    if predict(family, option, S, A, B, u, G, widths, spare, work) != 0:
+    """One action in place; a prediction is met with the domain. ``False``, S kept, where the status is not 0."""
+    A, B, C, G, widths, r = models.A[j], models.B[j], models.C[j], models.G[j], models.widths[j], models.r[j]
+    if advance(action, family, option, S, C, y, r, A, B, u, G, widths, spare, work) != 0:
         return False
-    if domain.shape[0] == 0:
-        _copy(spare, S)
+    if action != PREDICT or models.domains.shape[1] == 0:
+        copy(spare, S)
         return True
     met = work.state[0 : S.shape[0]]
-    if meet_box(family, spare, domain[0], domain[1], met, work) != 0:
+    lower, upper = models.domains[j, 0], models.domains[j, 1]
+    if advance(MEET_BOX, family, option, spare, C, lower, upper, A, B, u, G, widths, met, work) != 0:
         return False
-    _copy(met, S)
+    copy(met, S)
     return True
-
-
-@kernel
-def _copy(source: Matrix, target: Matrix) -> None:
-    for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
-
-
-@kernel
-def bank_update(
-    family: int, option: int, stack: Stack, C: Stack, Y: Matrix, R: Matrix, status: NDArray[np.int64],
-    first: int, last: int, spare: Matrix, work: Scratch,
-) -> None:  # fmt: skip
-    """Data update of the instances first … last − 1 in place; an instance whose status is not 0 keeps its state.
-
-    stack (N, rows, n), Y (N, m); C (M, m, n) and R (M, m) with M = N, or M = 1 for all alike.
-    """
-    for i in range(first, last):
-        status[i] = update(family, option, stack[i], C[i % C.shape[0]], Y[i], R[i % R.shape[0]], spare, work)
-        if status[i] == 0:
-            _copy(spare, stack[i])
-
-
-@kernel
-def bank_predict(
-    family: int, option: int, stack: Stack, A: Stack, B: Stack, G: Stack, widths: Matrix, domains: Stack, U: Matrix,
-    status: NDArray[np.int64], first: int, last: int, spare: Matrix, work: Scratch,
-) -> None:  # fmt: skip
-    """Time update of the instances first … last − 1 in place, met with their domains; as :func:`bank_update`.
-
-    A (M, n, n), B (M, n, p), G (M, n, q), widths (M, q), domains (M, 2 or 0, n), U (N, p).
-    """
-    for i in range(first, last):
-        j = i % A.shape[0]
-        done = _advance(
-            family, option, stack[i], spare, A[j], B[j], G[j], widths[i % widths.shape[0]], domains[j], U[i], work
-        )
-        status[i] = 0 if done else 1
-
-
-@kernel
-def bank_run(
-    family: int, option: int, stack: Stack, A: Stack, B: Stack, C: Stack, G: Stack, widths: Matrix, R: Matrix,
-    domains: Stack, Y: Stack, U: Stack, points: Stack, lower: Stack, upper: Stack, volumes: Matrix,
-    y_lower: Stack, y_upper: Stack, y_points: Stack, done: NDArray[np.int64], first: int, last: int,
-    spare: Matrix, work: Scratch,
-) -> None:  # fmt: skip
-    """:func:`run` of the instances first … last − 1; Y (N, T, m), U (N, T, p), the records likewise; ``done`` counts rows."""
-    for i in range(first, last):
-        j = i % A.shape[0]
-        record = Record(points[i], lower[i], upper[i], volumes[i], y_lower[i], y_upper[i], y_points[i])
-        done[i], _ = run(
-            family, option, stack[i], spare, A[j], B[j], C[j], G[j], widths[j], R[j], domains[j],
-            Y[i], U[i], record, work,
-        )  # fmt: skip

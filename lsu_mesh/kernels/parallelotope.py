@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
-from lsu_mesh.kernels.edges import enclose_along_best_edges, enclose_by_swaps
+from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.edges import choose
 from lsu_mesh.kernels.enclosure import LARGEST_RESIDUAL, enclose, inflate, residual_row
 from lsu_mesh.kernels.linear_algebra import invert
 from lsu_mesh.kernels.rounding import down, gamma, up
-from lsu_mesh.kernels.scratch import BUNDLE, DELTA, STRIP, Scratch
+from lsu_mesh.kernels.scratch import BUNDLE, CANDIDATES, DELTA, STRIP, Scratch
 from lsu_mesh.kernels.strip import EMPTY, OVERFLOW, STRIP_ROWS, UNCHANGED, cut
 
 Matrix = NDArray[np.float64]
@@ -34,38 +34,23 @@ def predict(
 
     c (n,), T (n, n), A (n, n), B (n, p), u (p,), G (n, q), widths (q,). ``IMAGE``: edges along A T (Lainová et al. 2019,
     eq. 36); ``CGZ``: greedy swaps of edges (Chisci, Garulli & Zappa 1996); ``EDGES``: the best n of all edges;
-    ``STRIPS``: the image, then the faces of the circumscribed box as strips. Returns 0 or ``OVERFLOW``.
+    ``STRIPS``: the image; the caller then offers the faces of the box that circumscribes the zonotope, left in rows
+    ``BUNDLE`` and ``BUNDLE + 1`` of the scratch vectors. Returns 0 or ``OVERFLOW``.
     """
     delta = work.vectors[DELTA]
     image(c, T, A, B, u, new_c, new_T, delta)
-    if time_update == CGZ:
-        enclosed = enclose_by_swaps(new_T, G, widths, delta, work)
-    elif time_update == EDGES:
-        enclosed = enclose_along_best_edges(new_T, G, widths, delta, work)
-    elif time_update == STRIPS:
-        return enclose_with_box(new_c, new_T, G, widths, delta, work)
-    else:
-        enclosed = enclose(new_T, G, widths, delta, work)
-    return 0 if enclosed else OVERFLOW
+    zonotope_hull(new_c, new_T, G, widths, delta, work.vectors[BUNDLE], work.vectors[BUNDLE + 1])
+    columns, weights = G, widths
+    if time_update == CGZ or time_update == EDGES:
+        choose(new_T, G, widths, delta, time_update == EDGES, work)
+        columns, weights = work.pages[CANDIDATES], work.weights[0 : c.size + widths.size]
+    return 0 if enclose(new_T, columns, weights, delta, work) else OVERFLOW
 
 
-@kernel
-def enclose_with_box(c: Vector, T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> int:
-    """Enclosure along the edges T, then the faces of the box around ``c + T ξ ⊕ G diag(widths) η ⊕ box(delta)``.
-
-    Leaves that box in rows ``BUNDLE`` and ``BUNDLE + 1`` of the scratch vectors. Returns 0 or ``OVERFLOW``.
-    """
-    lower, upper = work.vectors[BUNDLE], work.vectors[BUNDLE + 1]
-    zonotope_hull(c, T, G, widths, delta, lower, upper)
-    if not enclose(T, G, widths, delta, work):
-        return OVERFLOW
-    return cut_by_box(c, T, lower, upper, work)
-
-
-@kernel
+@inner
 def zonotope_hull(c: Vector, T: Matrix, G: Matrix, widths: Vector, delta: Vector, lower: Vector, upper: Vector) -> None:
     """Interval hull ``c ± (Σ_j |T_j| + |G| widths + delta)``, rounded outward."""
-    n, q = G.shape
+    n, q = c.size, widths.size
     for i in range(n):
         reach = delta[i]
         for j in range(n):
@@ -103,65 +88,26 @@ def image(c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, new_c: Vector, 
 
 
 @kernel
-def update(c: Vector, T: Matrix, C: Matrix, y: Vector, r: Vector, new_c: Vector, new_T: Matrix, work: Scratch) -> int:
-    """Data update: the strips ``|y − C x| ≤ r`` in the order of the rows; NaN is no strip.
+def cut_all(c: Vector, T: Matrix, P: Matrix, first: Vector, second: Vector, interval: bool, work: Scratch) -> int:
+    """Cut by strips in the order of the rows of P (m, n), in place (the set is spoilt where the status is not 0).
 
-    Source: Lainová et al. 2019, eq. (33). C (m, n), y (m,), r (m,). Returns 0, ``OVERFLOW``, or k + 1 where the strip of
-    row k is proved to miss the set.
+    The strips are ``first ≤ P x ≤ second`` where ``interval``, else ``|first − P x| ≤ second``; NaN is no strip. Returns 0,
+    ``OVERFLOW``, or k + 1 where the strip of row k is proved to miss the set. Source: Lainová et al. 2019, eq. (33).
     """
     delta = work.vectors[DELTA]
     strips = work.vectors[STRIP : STRIP + STRIP_ROWS]
-    _copy(c, T, new_c, new_T, delta)
     touched = False
-    for k in range(y.size):
-        if not math.isnan(y[k]):
-            status = cut(new_c, new_T, delta, C[k], down(y[k] - r[k]), up(y[k] + r[k]), strips)
+    for i in range(c.size):
+        delta[i] = 0.0
+    for k in range(first.size):
+        if not math.isnan(first[k]):
+            low = first[k] if interval else down(first[k] - second[k])
+            high = second[k] if interval else up(first[k] + second[k])
+            status = cut(c, T, delta, P[k], low, high, strips)
             if status == EMPTY:
                 return k + 1
             touched = touched or status != UNCHANGED
-    return _settle(new_T, delta, touched, work)
-
-
-@kernel
-def meet_box(c: Vector, T: Matrix, lower: Vector, upper: Vector, new_c: Vector, new_T: Matrix, work: Scratch) -> int:
-    """Offer the faces of a box as strips, each where it cuts. Returns as :func:`update`, k being the coordinate."""
-    _copy(c, T, new_c, new_T, work.vectors[DELTA])
-    return cut_by_box(new_c, new_T, lower, upper, work)
-
-
-@kernel
-def cut_by_box(c: Vector, T: Matrix, lower: Vector, upper: Vector, work: Scratch) -> int:
-    """As :func:`meet_box`, in place (the set is spoilt where the status is not 0)."""
-    n = c.size
-    delta, axis = work.vectors[DELTA], work.vectors[BUNDLE + 2]
-    strips = work.vectors[STRIP : STRIP + STRIP_ROWS]
-    touched = False
-    for i in range(n):
-        delta[i], axis[i] = 0.0, 0.0
-    for k in range(n):
-        axis[k] = 1.0
-        status = cut(c, T, delta, axis, lower[k], upper[k], strips)
-        axis[k] = 0.0
-        if status == EMPTY:
-            return k + 1
-        touched = touched or status != UNCHANGED
-    return _settle(T, delta, touched, work)
-
-
-@kernel
-def _copy(c: Vector, T: Matrix, new_c: Vector, new_T: Matrix, delta: Vector) -> None:
-    n = c.size
-    for i in range(n):
-        new_c[i] = c[i]
-        delta[i] = 0.0
-        for j in range(n):
-            new_T[i, j] = T[i, j]
-
-
-@kernel
-def _settle(T: Matrix, delta: Vector, touched: bool, work: Scratch) -> int:
-    """Make the parallelotope hold what rounding has lost since it was last exact."""
-    if touched and not enclose(T, work.no_columns, work.no_weights, delta, work):
+    if touched and not enclose(T, T, delta[0:0], delta, work):
         return OVERFLOW
     return 0
 

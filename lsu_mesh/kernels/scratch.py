@@ -19,40 +19,40 @@ VECTORS = 19
 INVERSE = 0
 FACTOR = 1
 BASIS = 2
-BODY = 3  # edges of the parallelotope that LSUO makes of its box
-SQUARES = 4
+BODY = 3  # edges of the parallelotope that LSUO makes of its box; faces of the parallelotope of a bundle
+IDENTITY = 4
+SQUARES = 5
+
+# Matrices (n, 2 n + q) of ``pages``, rows of ``picks``.
+COLUMNS = 0
+CANDIDATES = 1
+CHOSEN = 0
+BEST = 1
 
 
 class Scratch(NamedTuple):
-    """vectors (VECTORS, n), squares (SQUARES, n, n); columns, candidates (n, n + q) and weights (n + q,) for a zonotope's
-    columns; chosen, best (n,) their indices; state (n + 3, n) for a state on the way; no_columns (n, 0), no_weights
-    (0,) stand for no noise.
+    """vectors (VECTORS, n), squares (SQUARES, n, n), state (n + 3, n) for a state on the way; for the columns of a
+    zonotope pages (2, n, 2 n + q), weights (n + q,) and picks (2, n), indices of columns.
     """
 
     vectors: NDArray[np.float64]
     squares: NDArray[np.float64]
-    columns: NDArray[np.float64]
-    candidates: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    chosen: NDArray[np.int64]
-    best: NDArray[np.int64]
     state: NDArray[np.float64]
-    no_columns: NDArray[np.float64]
-    no_weights: NDArray[np.float64]
+    pages: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    picks: NDArray[np.int64]
 
 
 def scratch(n: int, noise_columns: int) -> Scratch:
     """Scratch for n states and as many columns of the noise (inputs included)."""
     wide = n + noise_columns
+    squares = np.zeros((SQUARES, n, n))
+    squares[IDENTITY] = np.eye(n)
     return Scratch(
         vectors=np.zeros((VECTORS, n)),
-        squares=np.zeros((SQUARES, n, n)),
-        columns=np.zeros((n, wide)),
-        candidates=np.zeros((n, wide)),
-        weights=np.zeros(wide),
-        chosen=np.zeros(n, dtype=np.int64),
-        best=np.zeros(n, dtype=np.int64),
+        squares=squares,
         state=np.zeros((n + 3, n)),
-        no_columns=np.zeros((n, 0)),
-        no_weights=np.zeros(0),
+        pages=np.zeros((2, n, n + wide)),
+        weights=np.zeros(wide),
+        picks=np.zeros((2, n), dtype=np.int64),
     )

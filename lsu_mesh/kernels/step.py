@@ -1,8 +1,9 @@
-"""One step of each family of filters, by its number: the single place where single step, loop and bank come together.
+"""One step of each family of filters: the single place where single step, loop and bank come together.
 
 A state is a matrix with rows of length n: ``BOX`` lower, upper; ``PARALLELOTOPE`` c, then the n rows of T; ``BUNDLE`` c, the
-n rows of T, lower, upper. ``option`` is, for ``BOX``, whether the hull is met with the prediction, and for ``PARALLELOTOPE``
-the kind of time update (``kernels/parallelotope.py``).
+n rows of T, lower, upper. ``option`` is, for ``BOX``, whether the hull is met with the prediction, and for
+``PARALLELOTOPE`` the kind of time update (``kernels/parallelotope.py``). All families and actions share one compiled
+function: each further one would compile everything below it once more.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels import box, bundle, parallelotope
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels import box, parallelotope
+from lsu_mesh.kernels.bundle import shrink, tighten_all, tighten_each_other
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.linear_algebra import log_abs_determinant
+from lsu_mesh.kernels.parallelotope import STRIPS, cut_all
 from lsu_mesh.kernels.scratch import BUNDLE as BUNDLE_ROW
-from lsu_mesh.kernels.scratch import FACTOR, Scratch
+from lsu_mesh.kernels.scratch import FACTOR, IDENTITY, Scratch
 from lsu_mesh.kernels.strip import hull, middle
 
 Matrix = NDArray[np.float64]
@@ -26,65 +29,85 @@ BOX = 0
 PARALLELOTOPE = 1
 BUNDLE = 2
 
+UPDATE = 0
+MEET_BOX = 1
+PREDICT = 2
+
 LOG_2 = math.log(2.0)
 
-_box_update, _box_predict, _box_meet, _box_output, _box_volume = (
-    box.update, box.predict, box.meet_box, box.predict_output, box.volume,
-)  # fmt: skip
-_update, _predict, _meet, _output = (
-    parallelotope.update, parallelotope.predict, parallelotope.meet_box, parallelotope.predict_output,
-)  # fmt: skip
-_bundle_update, _bundle_predict, _bundle_meet = bundle.update, bundle.predict, bundle.meet_box
-
-
-def state_rows(family: int, n: int) -> int:
-    """Rows of a state of n coordinates."""
-    return {BOX: 2, PARALLELOTOPE: n + 1, BUNDLE: n + 3}[family]
+_update_box, _predict_box, _predict_parallelotope = box.update, box.predict, parallelotope.predict
+_output_of_box, _output_of_parallelotope, _volume_of_box = (
+    box.predict_output,
+    parallelotope.predict_output,
+    box.volume,
+)
 
 
 @kernel
-def update(family: int, option: int, S: Matrix, C: Matrix, y: Vector, r: Vector, new: Matrix, work: Scratch) -> int:
-    """Data update ``new ← S ∩ {|y − C x| ≤ r}``; S is kept. Status: 0, negative (overflow), or k + 1 (row k misses)."""
-    n = S.shape[1]
-    if family == BOX:
-        return _box_update(S[0], S[1], C, y, r, option != 0, new[0], new[1], work)
-    if family == PARALLELOTOPE:
-        return _update(S[0], S[1 : n + 1], C, y, r, new[0], new[1 : n + 1], work)
-    return _bundle_update(
-        S[0], S[1 : n + 1], S[n + 1], S[n + 2], C, y, r,
-        new[0], new[1 : n + 1], new[n + 1], new[n + 2], work,
-    )  # fmt: skip
-
-
-@kernel
-def predict(
-    family: int, option: int, S: Matrix, A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector,
+def advance(
+    action: int, family: int, option: int, S: Matrix,
+    P: Matrix, first: Vector, second: Vector,
+    A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector,
     new: Matrix, work: Scratch,
 ) -> int:  # fmt: skip
-    """Time update ``new ← A S + B u ⊕ G diag(widths)[−1,1]^q``; S is kept. Status: 0 or negative (overflow)."""
+    """``new`` ← S after one action; S is kept, ``new`` is spoilt where the status is not 0.
+
+    ``UPDATE``: ``S ∩ {|first − P x| ≤ second}``, rows in order, NaN is no strip. ``MEET_BOX``: ``S ∩ [first, second]``.
+    ``PREDICT``: ``A S + B u ⊕ G diag(widths)[−1,1]^q``. What an action does not need is not read. Returns 0, negative on
+    overflow, or k + 1 where the strip of row (the face of coordinate) k is proved to leave nothing.
+    """
     n = S.shape[1]
-    if family == BOX:
-        return _box_predict(S[0], S[1], A, B, u, G, widths, new[0], new[1], work)
-    if family == PARALLELOTOPE:
-        return _predict(S[0], S[1 : n + 1], A, B, u, G, widths, option, new[0], new[1 : n + 1], work)
-    return _bundle_predict(
-        S[0], S[1 : n + 1], S[n + 1], S[n + 2], A, B, u, G, widths,
-        new[0], new[1 : n + 1], new[n + 1], new[n + 2], work,
-    )  # fmt: skip
+    box_row = 0 if family == BOX else n + 1
+    status = 0
+    if family != PARALLELOTOPE:
+        status = _advance_box(
+            action, option, family == BUNDLE, S[box_row : box_row + 2], P, first, second,
+            A, B, u, G, widths, new[box_row : box_row + 2], work,
+        )  # fmt: skip
+    if status != 0 or family == BOX:
+        return status
+    c, T = new[0], new[1 : n + 1]
+    rows, low, high, interval = P, first, second, action != UPDATE
+    if interval:
+        rows = work.squares[IDENTITY]
+    if action == PREDICT:
+        time_update = option if family == PARALLELOTOPE else STRIPS
+        status = _predict_parallelotope(S[0], S[1 : n + 1], A, B, u, G, widths, time_update, c, T, work)
+        if status != 0 or time_update != STRIPS:
+            return status
+        low, high = work.vectors[BUNDLE_ROW], work.vectors[BUNDLE_ROW + 1]
+        if family == BUNDLE:  # the hull of the image is exact: tighter than the hull of what encloses it
+            status = shrink(new[n + 1], new[n + 2], low, high)
+    else:
+        copy(S[0 : n + 1], new[0 : n + 1])
+    if status == 0 and (family == PARALLELOTOPE or action == UPDATE):
+        status = cut_all(c, T, rows, low, high, interval, work)
+    if status != 0 or family == PARALLELOTOPE:
+        return status
+    return tighten_each_other(c, T, new[n + 1], new[n + 2], work)
 
 
-@kernel
-def meet_box(family: int, S: Matrix, lower: Vector, upper: Vector, new: Matrix, work: Scratch) -> int:
-    """``new ← S ∩ [lower, upper]``; S is kept. Status: 0, negative (overflow), or i + 1 (nothing in coordinate i)."""
-    n = S.shape[1]
-    if family == BOX:
-        return _box_meet(S[0], S[1], lower, upper, new[0], new[1])
-    if family == PARALLELOTOPE:
-        return _meet(S[0], S[1 : n + 1], lower, upper, new[0], new[1 : n + 1], work)
-    return _bundle_meet(
-        S[0], S[1 : n + 1], S[n + 1], S[n + 2], lower, upper,
-        new[0], new[1 : n + 1], new[n + 1], new[n + 2], work,
-    )  # fmt: skip
+@inner
+def _advance_box(
+    action: int, option: int, in_bundle: bool, S: Matrix, P: Matrix, first: Vector, second: Vector,
+    A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector, new: Matrix, work: Scratch,
+) -> int:  # fmt: skip
+    """:func:`advance` for a box, S (2, n); in a bundle the data strips tighten it one by one."""
+    if action == PREDICT:
+        return _predict_box(S[0], S[1], A, B, u, G, widths, new[0], new[1], work)
+    if action == UPDATE and not in_bundle:
+        return _update_box(S[0], S[1], P, first, second, option != 0, new[0], new[1], work)
+    copy(S, new)
+    if action == UPDATE:
+        return tighten_all(new[0], new[1], P, first, second)
+    return shrink(new[0], new[1], first, second)
+
+
+@inner
+def copy(source: Matrix, target: Matrix) -> None:
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
 
 
 @kernel
@@ -94,14 +117,15 @@ def predict_output(
     """Interval of ``C x + v``; of a bundle the meet of both its sets' intervals, with the middle as the point."""
     n = S.shape[1]
     if family == BOX:
-        _box_output(S[0], S[1], C, r, lower, upper, point)
-    else:
-        _output(S[0], S[1 : n + 1], C, r, lower, upper, point)
+        _output_of_box(S[0], S[1], C, r, lower, upper, point)
+        return
+    _output_of_parallelotope(S[0], S[1 : n + 1], C, r, lower, upper, point)
     if family == BUNDLE:
+        rest = work.vectors[BUNDLE_ROW]
         for k in range(C.shape[0]):
-            of_box = work.vectors[BUNDLE_ROW, 0:1], work.vectors[BUNDLE_ROW + 1, 0:1], work.vectors[BUNDLE_ROW + 2, 0:1]
-            _box_output(S[n + 1], S[n + 2], C[k : k + 1], r[k : k + 1], of_box[0], of_box[1], of_box[2])
-            lower[k], upper[k] = max(lower[k], of_box[0][0]), min(upper[k], of_box[1][0])
+            low, high, mid = rest[0:1], work.vectors[BUNDLE_ROW + 1, 0:1], work.vectors[BUNDLE_ROW + 2, 0:1]
+            _output_of_box(S[n + 1], S[n + 2], C[k : k + 1], r[k : k + 1], low, high, mid)
+            lower[k], upper[k] = max(lower[k], low[0]), min(upper[k], high[0])
             point[k] = middle(lower[k], upper[k])
 
 
@@ -121,7 +145,7 @@ def describe(family: int, S: Matrix, point: Vector, lower: Vector, upper: Vector
     for i in range(n):
         lower[i], upper[i] = S[first, i], S[first + 1, i]
         point[i] = middle(lower[i], upper[i])
-    size = _box_volume(lower, upper)
+    size = _volume_of_box(lower, upper)
     return size if family == BOX else min(size, volume_of(S[1 : n + 1], work.squares[FACTOR]))
 
 

@@ -102,7 +102,7 @@ class Parallelotope(Support):
         c, T, delta = np.empty(n), np.empty((n, n)), np.empty(n)
         parallelotope.image(self._center, self._generators, R, np.eye(n), offset, c, T, delta)
         work = scratch(n, 0)
-        if enclose_along_edges(T, work.no_columns, work.no_weights, delta, work):
+        if enclose_along_edges(T, T, work.weights[0:0], delta, work):
             return Parallelotope(c, T)
         return None
 

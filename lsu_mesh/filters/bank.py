@@ -1,0 +1,184 @@
+"""Many independent filters of one kind, in step with each other."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lsu_mesh.errors import ModelError
+from lsu_mesh.filters.arguments import kernel_model
+from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.run import FilterRun
+from lsu_mesh.kernels import loops
+from lsu_mesh.kernels.scratch import scratch
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.support import Support
+
+Stack = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SMALLEST_SHARE = 64
+"""Instances below which a thread of its own does not pay."""
+
+
+class FilterBank:
+    """The same filter over a leading axis of N independent instances (Monte Carlo runs, many targets).
+
+    Parameters
+    ----------
+    kind:
+        LSUO, LSUP or LSUPB, the class.
+    models:
+        One model for all instances, or N models of equal shape.
+    priors:
+        N priors, or one for all (then N is the number of models).
+    threads:
+        Cores to use; all by default.
+    options:
+        Options of the class, as ``time_update`` of LSUP.
+
+    Every instance gives the same bits as a filter of its own. An instance whose data contradict its bounds (or whose set
+    overflows) keeps the set that it had, and the others go on.
+    """
+
+    def __init__(
+        self,
+        kind: type[CompiledFilter],
+        models: LSUModel | Sequence[LSUModel],
+        priors: Support | Sequence[Support],
+        threads: int | None = None,
+        **options: Any,
+    ) -> None:
+        model_list = [models] if isinstance(models, LSUModel) else list(models)
+        prior_list = [priors] if isinstance(priors, Support) else list(priors)
+        count = max(len(model_list), len(prior_list))
+        if {len(model_list), len(prior_list)} - {1, count} or not count:
+            raise ModelError(f"{len(model_list)} models and {len(prior_list)} priors do not make a bank")
+        first: Any = kind(model_list[0], prior_list[0], **options)
+        if not isinstance(first, CompiledFilter) or not first.has_compiled_loop:
+            raise ModelError(f"{kind.__name__} with these options has no compiled bank; make a list of filters")
+        self.kind = kind
+        self._filter = first
+        self._models = _stack(model_list)
+        self._states = np.array([kind._enclose(prior) for prior in prior_list])
+        if len(self._states) != count:
+            self._states = np.repeat(self._states, count, axis=0)
+        self._threads = max(1, min(threads or os.cpu_count() or 1, count // SMALLEST_SHARE))
+
+    def __len__(self) -> int:
+        """N"""
+        return len(self._states)
+
+    @property
+    def points(self) -> Matrix:
+        """Point estimates (N, n)."""
+        return np.array([self._filter._describe(state)[0] for state in self._states])
+
+    def bounds(self) -> tuple[Matrix, Matrix]:
+        """Interval hulls ``(lower, upper)``, each (N, n)."""
+        described = [self._filter._describe(state) for state in self._states]
+        return np.array([row[1] for row in described]), np.array([row[2] for row in described])
+
+    def support(self, i: int) -> Support:
+        """The set of instance i."""
+        return self.kind._make_support(self._states[i].copy())
+
+    def update(self, Y: ArrayLike) -> Flags:
+        """Data update with Y (N, m), NaN for missing; ``False`` marks an instance whose data contradict its set."""
+        outputs = self._table("Y", Y, self._models.C.shape[1])[:, np.newaxis]
+        return self._sweep(outputs, self._no_inputs(1), updating=True, last_prediction=False)[1][:, 1] == loops.DONE
+
+    def predict(self, U: ArrayLike | None = None) -> Flags:
+        """Time update with U (N, p); ``False`` marks an instance whose prediction misses its domain."""
+        p = self._models.B.shape[2]
+        if U is None and p:
+            raise ModelError(f"the models have {p} input(s): give U of shape ({len(self)}, {p})")
+        inputs = self._no_inputs(1) if U is None else self._table("U", U, p)[:, np.newaxis]
+        outputs = np.zeros((len(self), 1, self._models.C.shape[1]))
+        return self._sweep(outputs, inputs, updating=False, last_prediction=True)[1][:, 1] == loops.DONE
+
+    def run(self, Y: ArrayLike, U: ArrayLike | None = None) -> tuple[FilterRun, NDArray[np.int64]]:
+        """All rows of Y (N, T, m) with the inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
+
+        An instance with fewer rows done than T met a contradiction there; its further rows are NaN.
+        """
+        m, p = self._models.C.shape[1], self._models.B.shape[2]
+        outputs = np.array(Y, dtype=np.float64)
+        if outputs.ndim != 3 or outputs.shape[0] != len(self) or outputs.shape[2] != m:
+            raise ModelError(f"Y must have shape ({len(self)}, steps, {m}), it has shape {outputs.shape}")
+        if U is None and p:
+            raise ModelError(f"the models have {p} input(s): give U of shape {(*outputs.shape[:2], p)}")
+        inputs = self._no_inputs(outputs.shape[1]) if U is None else np.array(U, dtype=np.float64)
+        if inputs.shape != (*outputs.shape[:2], p):
+            raise ModelError(f"U must have shape {(*outputs.shape[:2], p)}, it has shape {inputs.shape}")
+        record, outcome = self._sweep(outputs, inputs, updating=True, last_prediction=False)
+        return FilterRun(*record), outcome[:, 0]
+
+    def _table(self, name: str, value: ArrayLike, columns: int) -> Matrix:
+        table = np.array(value, dtype=np.float64)
+        if table.shape != (len(self), columns):
+            raise ModelError(f"{name} must have shape ({len(self)}, {columns}), it has shape {table.shape}")
+        return table
+
+    def _no_inputs(self, rows: int) -> Stack:
+        return np.zeros((len(self), rows, self._models.B.shape[2]))
+
+    def _sweep(
+        self, Y: Stack, U: Stack, updating: bool, last_prediction: bool
+    ) -> tuple[loops.Record, NDArray[np.int64]]:
+        record = _record(len(self), Y.shape[1] if updating else 0, self._states.shape[2], Y.shape[2])
+        outcome = np.zeros((len(self), 2), dtype=np.int64)
+
+        def share(first: int, last: int) -> None:
+            loops.sweep(
+                self._filter.family, self._filter.option, updating, last_prediction, self._states,
+                np.empty_like(self._states[0]), self._models, Y, U, record, outcome, first, last,
+                scratch(self._states.shape[2], self._models.G.shape[2]),
+            )  # fmt: skip
+
+        _in_shares(share, len(self), self._threads)
+        return record, outcome
+
+
+def _in_shares(work: Callable[[int, int], None], count: int, threads: int) -> None:
+    """Call ``work(first, last)`` for as many shares of ``range(count)``; kernels release the interpreter's lock."""
+    if threads == 1:
+        work(0, count)
+        return
+    edges = [count * k // threads for k in range(threads + 1)]
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, edges[:-1], edges[1:]))
+
+
+def _stack(models: Sequence[LSUModel]) -> loops.Models:
+    """Arrays of the models with a leading axis; ``ModelError`` where their shapes or their having a domain differ."""
+    arrays = [kernel_model(model) for model in models]
+    n = models[0].state_count
+    shapes = {tuple(array.shape for array in one) for one in arrays}
+    with_domain = [model.domain for model in models if model.domain is not None]
+    if len(shapes) > 1 or len(with_domain) not in (0, len(models)):
+        raise ModelError("the models of a bank must have equal shapes, and all of them a domain or none")
+    domains = np.array([box.bounds() for box in with_domain]) if with_domain else np.zeros((len(models), 0, n))
+    widths = [np.concatenate([one.rho, np.zeros(one.B.shape[1])]) for one in arrays]
+    return loops.Models(
+        A=np.array([one.A for one in arrays]),
+        B=np.array([one.B for one in arrays]),
+        C=np.array([one.C for one in arrays]),
+        G=np.array([one.G for one in arrays]),
+        widths=np.array(widths),
+        r=np.array([one.r for one in arrays]),
+        domains=domains,
+    )
+
+
+def _record(count: int, rows: int, n: int, m: int) -> loops.Record:
+    def blank(*shape: int) -> Stack:
+        return np.full((count, rows, *shape), np.nan)
+
+    return loops.Record(blank(n), blank(n), blank(n), blank(), blank(m), blank(m), blank(m))
