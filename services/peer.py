@@ -62,6 +62,7 @@ def run_node(node: Node, settings: SessionSettings) -> int:
                     f"{node.role} {node.name}: all steps are published; serving late joiners until stopped",
                     file=sys.stderr,
                 )
+        peer.farewell()
     return 0
 
 
@@ -117,6 +118,10 @@ class Peer:
             self._publish(self._take(arrival))
             arrival = self._bus.next(0)
         self._publish(self._node.tick(self._clock.now()))
+
+    def farewell(self) -> None:
+        """A last health message, so that the counts of the whole run are known."""
+        self._publish([self._node.health(self._clock.now())])
 
     def _patience(self) -> float:
         wakeup = self._node.wakeup()

@@ -23,6 +23,8 @@ Rows = Annotated[list[Numbers], Meta(max_length=4096)]
 Text = Annotated[str, Meta(max_length=4096)]
 Reference = tuple[Text, Text, Text, Count]
 """``[topic, src, boot, seq]`` of a message that was used."""
+Guarantee = Literal["declared", "learned", "none"]
+"""Whether a set holds the state under the declared bounds, under bounds that explain the data, or not surely at all."""
 
 _BOOT = re.compile(r"[0-9a-f]{16}")
 
@@ -193,8 +195,8 @@ class Prediction(Message, frozen=True, kw_only=True):
     y_lower: Numbers
     y_upper: Numbers
     y_point: Numbers
-    epoch: Count = 0
-    guarantee: Literal["declared", "learned"] = "declared"
+    epoch: Count
+    guarantee: Guarantee
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -218,12 +220,14 @@ class Posterior(Message, frozen=True, kw_only=True):
     status: Literal["ok", "predicted", "inconsistent", "restarted"]
     revision: Count
     epoch: Count
-    guarantee: Literal["declared", "learned"]
+    guarantee: Guarantee
     base: Reference | Literal["prior", "domain"]
     used: Annotated[list[Reference], Meta(max_length=4096)]
     bounds: Bounds
     missing: Annotated[list[Text], Meta(max_length=4096)]
     cause: Text | None = None
+    gain: float | None = None
+    """Gain of the step's Bayesian transfers in nats; nil where none was used."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -234,6 +238,8 @@ class Posterior(Message, frozen=True, kw_only=True):
             raise ValueError(f"point has {len(self.point)} entries, lower {len(self.lower)}")
         if self.log_volume is not None:
             _check_finite("log_volume", [self.log_volume])
+        if self.gain is not None:
+            _check_finite("gain", [self.gain])
 
 
 class Rejection(_Strict, frozen=True, kw_only=True):

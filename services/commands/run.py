@@ -106,6 +106,7 @@ def _supervise(run: Run) -> int:
         run.bus.subscribe(f"{PREFIX}/{run.configuration.mesh.name}/{topic}/*")
     run.bus.watch_alive(key(run.configuration.mesh.name, "live", "*"))
     try:
+        _announce(run)
         code = _start(run)
         if code == OK:
             _follow(run)
@@ -117,9 +118,18 @@ def _supervise(run: Run) -> int:
     if code != OK:
         for words in run.happened:
             print(words, file=sys.stderr)
-        return code
+        return OK if run.stop.is_set else code
     _settle(run)
     return _sum_up(run)
+
+
+def _announce(run: Run) -> None:
+    mesh = run.configuration.mesh
+    last = _last_step(run.configuration)
+    length = "until stopped" if last is None else f"{last} steps"
+    where = "not recorded" if run.recording is None else f"recorded in {run.recording}"
+    count = len(run.configuration.peers()) - (run.recording is None)
+    print(f"mesh {mesh.name!r}: {count} peers, {length} at {mesh.rate:g} Hz, {where}", file=sys.stderr)
 
 
 def _start(run: Run) -> int:

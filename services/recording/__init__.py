@@ -1,0 +1,4 @@
+"""The recording of a mesh as a Rerun file: raw payloads, which machines recompute, and drawings, which people look at.
+
+The only folder that imports rerun. What lies where in a recording stands in ``names.py``, what opens first in ``blueprint.py``.
+"""

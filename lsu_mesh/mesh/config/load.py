@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from lsu_mesh.mesh.config.peers import read_filter, read_fusion, read_plant, read_sensor
+from lsu_mesh.mesh.config.peers import read_filter, read_fusion, read_plant, read_sensor, shared_sensor_warnings
 from lsu_mesh.mesh.config.settings import (
     Configuration,
     MeshSettings,
@@ -101,13 +101,10 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
         name: read_sensor(table, name, count, path.parent) for name, table in _named(root, "sensors", problems).items()
     }
     plant = read_plant(root.table("plant"), model, sensors, path.parent, problems)
-    filters = {
-        name: read_filter(table, name, sensors, model, prior)
-        for name, table in _named(root, "filters", problems).items()
-    }
-    fusion = {
-        name: read_fusion(table, name, filters, sensors) for name, table in _named(root, "fusion", problems).items()
-    }
+    filter_tables, fusion_tables = _named(root, "filters", problems), _named(root, "fusion", problems)
+    peers = {"filters": list(filter_tables), "fusion": list(fusion_tables)}
+    filters = {name: read_filter(table, name, sensors, model, prior, peers) for name, table in filter_tables.items()}
+    fusion = {name: read_fusion(table, name, filters, peers) for name, table in fusion_tables.items()}
     recorder, network = _read_recorder(root), _read_network(root)
     supervisor = _read_supervisor(root)
     root.finish()
@@ -121,6 +118,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     return Configuration(
         path, mesh, model, prior, input_box, plant, dict(sorted(sensors.items())), dict(sorted(filters.items())),
         dict(sorted(fusion.items())), recorder, network, supervisor,
+        tuple(shared_sensor_warnings(filters, fusion)),
     )  # fmt: skip
 
 

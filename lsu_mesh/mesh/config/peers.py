@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from lsu_mesh.errors import ModelError
@@ -24,8 +24,9 @@ from lsu_mesh.supports.orthotope import Orthotope
 
 INPUTS = ("normal", "sine", "zero")
 FAULTS = ("bias", "drift", "stuck", "random", "lost")
-TRANSFERS = ("off",)
-POLICIES = ("intersect",)
+TRANSFERS = ("off", "predictor", "fused", "data-predictor")
+CONTRADICTIONS = ("reset", "hold", "widen")
+POLICIES = ("intersect", "relaxed")
 
 
 def read_plant(
@@ -122,18 +123,48 @@ def read_filter(
     sensors: Mapping[str, SensorSettings],
     model: LSUModel | None,
     prior: Orthotope | None,
+    peers: Mapping[str, Collection[str]],
 ) -> FilterSettings:
-    """``[filters.NAME]``; the filter is made once, so that the class checks its own options."""
+    """``[filters.NAME]``; the filter is made once, so that the class checks its own options.
+
+    ``peers`` holds the names of all ``filters`` and ``fusion`` tables.
+    """
     kind = table.choice("kind", tuple(FILTERS), REQUIRED)
     chosen = _read_names(table, "sensors", sensors)
     deadline = table.duration("deadline", 0.05)
     history = table.whole("history", 32, low=1, high=4096)
     transfer = table.choice("transfer", TRANSFERS, "off")
+    senders = _read_senders(table, name, transfer, peers)
+    on_contradiction = table.choice("on_contradiction", CONTRADICTIONS, "reset")
     reset_after = table.whole("reset_after", 5, low=1)
     options = table.rest()
     if isinstance(kind, str) and kind in FILTERS:
         _check_options(table, kind, options, sensors, chosen, model, prior)
-    return FilterSettings(name, str(kind), chosen, deadline, history, transfer, reset_after, options)
+    return FilterSettings(
+        name, str(kind), chosen, deadline, history, transfer, senders, on_contradiction, reset_after, options
+    )
+
+
+def _read_senders(table: Table, name: str, transfer: str, peers: Mapping[str, Collection[str]]) -> tuple[str, ...]:
+    """``transfer_from``: by default all other filters, or for fused boxes all fusions."""
+    known = peers["fusion"] if transfer == "fused" else [other for other in peers["filters"] if other != name]
+    given = table.texts("transfer_from", None)
+    if transfer == "off":
+        if given:
+            table.wrong("transfer_from", 'has no effect with transfer = "off"; remove it or choose a transfer')
+        return ()
+    for other in given or ():
+        if other not in known:
+            table.wrong("transfer_from", f'"{other}" cannot be transferred from; {nearest(other, known)}')
+    senders = tuple(sorted(set(known if given is None else given)))
+    if not senders:
+        table.wrong("transfer", f'"{transfer}" has nobody to come from')
+    return senders
+
+
+_OWN = (
+    "kind", "sensors", "deadline", "history", "transfer", "transfer_from", "on_contradiction", "reset_after",
+)  # fmt: skip
 
 
 def _check_options(
@@ -149,10 +180,9 @@ def _check_options(
     known = [key for key in inspect.signature(cls).parameters if key not in ("model", "prior")]
     for key in known:
         table.problems.asked.add(f"{table.path}.{key}")
-    own = ["kind", "sensors", "deadline", "history", "transfer", "reset_after"]
     unknown = [key for key in options if key not in known]
     for key in unknown:
-        table.wrong(key, f"unknown key; {nearest(key, [*own, *known])}")
+        table.wrong(key, f"unknown key; {nearest(key, [*_OWN, *known])}")
     if unknown or model is None or prior is None or table.problems.lines:
         return
     rows = [row for name in chosen for row in sensors[name].C]
@@ -164,12 +194,17 @@ def _check_options(
 
 
 def read_fusion(
-    table: Table, name: str, filters: Mapping[str, FilterSettings], sensors: Mapping[str, SensorSettings]
+    table: Table, name: str, filters: Mapping[str, FilterSettings], peers: Mapping[str, Collection[str]]
 ) -> FusionSettings:
-    """``[fusion.NAME]``."""
-    sources = _read_names(table, "sources", filters)
+    """``[fusion.NAME]``; sources are filters and other fusions."""
+    known = dict.fromkeys(other for other in (*filters, *peers["fusion"]) if other != name)
+    sources = _read_names(table, "sources", known)
     policy = table.choice("policy", POLICIES, "intersect")
     faults = table.whole("faults", 0)
+    if policy == "intersect" and faults:
+        table.wrong("faults", f'is {faults}, but policy = "intersect" trusts every source; set policy = "relaxed"')
+    if policy == "relaxed" and sources and faults >= len(sources):
+        table.wrong("faults", f"is {faults} of {len(sources)} sources; at least one source must be right")
     max_lag = table.whole("max_lag", 16, low=0, high=4096)
     deadline = table.duration("deadline", 0.05)
     quarantine_after = table.whole("quarantine_after", 20, low=1)
@@ -193,3 +228,28 @@ def _read_names(table: Table, key: str, known: Mapping[str, object]) -> tuple[st
         elif names.count(name) > 1:
             table.wrong(key, f'"{name}" is named twice')
     return tuple(sorted({name for name in names if name in known}))
+
+
+def shared_sensor_warnings(filters: Mapping[str, FilterSettings], fusion: Mapping[str, FusionSettings]) -> list[str]:
+    """A sensor that feeds several sources of a relaxed fusion makes that many of them lie at once."""
+    warnings = []
+    for settings in fusion.values():
+        if settings.policy != "relaxed":
+            continue
+        fed: dict[str, list[str]] = {}
+        for source in settings.sources:
+            for sensor in filters[source].sensors if source in filters else ():
+                fed.setdefault(sensor, []).append(source)
+        for sensor, sources in sorted(fed.items()):
+            if len(sources) > settings.faults:
+                warnings.append(
+                    f"[fusion.{settings.name}] faults = {settings.faults}, but sensor {sensor!r} feeds {len(sources)} "
+                    f"sources ({', '.join(sources)}); if it lies, all of them do"
+                )
+        warnings += [
+            f"[fusion.{settings.name}] source {source!r} takes transfers, so a liar may reach it; "
+            'use transfer = "off", or the fused box of this fusion'
+            for source in settings.sources
+            if source in filters and filters[source].transfer in ("predictor", "data-predictor")
+        ]
+    return warnings

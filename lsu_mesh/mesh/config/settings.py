@@ -83,6 +83,9 @@ class FilterSettings:
     deadline: float
     history: int
     transfer: str
+    transfer_from: tuple[str, ...]
+    """Filters (predictors) or fusions (fused boxes) whose knowledge is transferred."""
+    on_contradiction: str
     reset_after: int
     options: Mapping[str, Any]
 
@@ -148,6 +151,8 @@ class Configuration:
     recorder: RecorderSettings = field(default_factory=RecorderSettings)
     network: NetworkSettings = field(default_factory=NetworkSettings)
     supervisor: SupervisorSettings = field(default_factory=SupervisorSettings)
+    warnings: tuple[str, ...] = ()
+    """What is legal and yet probably not meant."""
 
     def model(self, sensors: Iterable[str]) -> LSUModel:
         """The model whose rows of C are those of the named sensors, in the order of their names."""

@@ -82,7 +82,7 @@ class Table:
             return default
         return value
 
-    def text(self, key: str, default: T = REQUIRED) -> str | T:
+    def text(self, key: str, default: Any = REQUIRED) -> Any:
         """A string."""
         return self.read(key, default, "a string", lambda v: v if isinstance(v, str) and v else None)
 
@@ -98,7 +98,7 @@ class Table:
         """true or false."""
         return self.read(key, default, "true or false", lambda v: v if isinstance(v, bool) else None)
 
-    def whole(self, key: str, default: T = REQUIRED, low: int = 0, high: int = 2**53) -> int | T:
+    def whole(self, key: str, default: Any = REQUIRED, low: int = 0, high: int = 2**53) -> Any:
         """An integer within limits."""
         limits = f"a whole number ≥ {low}" if high == 2**53 else f"a whole number from {low} to {high}"
 
@@ -107,7 +107,7 @@ class Table:
 
         return self.read(key, default, limits, convert)
 
-    def number(self, key: str, default: T = REQUIRED, above: float = -math.inf) -> float | T:
+    def number(self, key: str, default: Any = REQUIRED, above: float = -math.inf) -> Any:
         """A finite number, larger than ``above``."""
         limits = "a finite number" if above == -math.inf else f"a number > {above:g}"
 
@@ -126,11 +126,11 @@ class Table:
 
         return self.read(key, default, f'a duration of at least {low:g} s such as "50ms", "0.2s" or "1min"', convert)
 
-    def vector(self, key: str, default: T = REQUIRED) -> list[float] | T:
+    def vector(self, key: str, default: Any = REQUIRED) -> Any:
         """A list of finite numbers."""
         return self.read(key, default, "a list of finite numbers", _vector)
 
-    def matrix(self, key: str, default: T = REQUIRED) -> list[list[float]] | T:
+    def matrix(self, key: str, default: Any = REQUIRED) -> Any:
         """A list of rows of one length."""
 
         def convert(v: Any) -> list[list[float]] | None:
@@ -140,7 +140,7 @@ class Table:
 
         return self.read(key, default, "a matrix: a list of rows of one length, of finite numbers", convert)
 
-    def texts(self, key: str, default: T = REQUIRED) -> list[str] | T:
+    def texts(self, key: str, default: Any = REQUIRED) -> Any:
         """A list of strings."""
 
         def convert(v: Any) -> list[str] | None:

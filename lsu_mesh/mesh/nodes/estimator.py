@@ -16,7 +16,17 @@ import numpy as np
 
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Bounds, Input, Message, Posterior, Reference, SupportMessage
+from lsu_mesh.mesh.messages import (
+    Bounds,
+    Fused,
+    Guarantee,
+    Input,
+    Message,
+    Posterior,
+    Prediction,
+    Reference,
+    SupportMessage,
+)
 from lsu_mesh.mesh.nodes.node import SECOND, Node
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
@@ -44,6 +54,8 @@ class Step:
     base: Base = "prior"
     used_before: tuple[Reference, ...] = ()
     """Base of ``before`` and what was used since."""
+    transfers: Sequence[Prediction | Fused] | None = None
+    """Transfers used when the step was first closed; a replay uses the same."""
     closed: bool = False
     """Whether its data were combined once; they are never waited for again."""
     revision: int = -1
@@ -59,6 +71,7 @@ class Combined:
     missing: Sequence[str]
     origin: int | None
     cause: str | None = None
+    gain: float | None = None
 
 
 class Estimator(Node):
@@ -76,6 +89,8 @@ class Estimator(Node):
         """Whether the data of the current step are in the set."""
         self._steps: dict[int, Step] = {}
         self._newest = 0
+        self._heard_at: int | None = None
+        """When the last message came, of whatever step."""
         self._first_evidence: int | None = None
         self._candidate: Posterior | None = None
         self._base: Base = "prior"
@@ -86,12 +101,16 @@ class Estimator(Node):
         self._waiting = ""
         self._restarted = False
         self._counts: dict[str, float] = {
-            "late": 0,
-            "rewinds": 0,
-            "contradictions": 0,
-            "behind": 0,
-            "resets": 0,
-        }
+            "late": 0, "rewinds": 0, "contradictions": 0, "behind": 0, "resets": 0,
+        }  # fmt: skip
+        self.guarantee: Guarantee = "declared"
+        """The weakest guarantee among all that the set descends from."""
+        self._relied: dict[str, int] = {}
+        """Epoch of each source whose sets went into the set that is held now."""
+        self._epochs: dict[str, int] = {}
+        """Newest known epoch of each source."""
+        self.abandoned: str | None = None
+        """A source that was relied on and has abandoned its epoch since."""
         self.last_posterior: Posterior | None = None
         self.absent: set[str] = set()
         """Sources that are known to be gone and are not waited for."""
@@ -152,13 +171,44 @@ class Estimator(Node):
 
     def take_candidate(self, message: Posterior) -> None:
         """Note a sound set of the mesh from which a late joiner may start."""
+        if message.src == f"{self.role}/{self.name}":
+            self.epoch = max(self.epoch, message.epoch)
         if message.status in ("ok", "predicted") and (self._candidate is None or message.step > self._candidate.step):
             self._candidate = message
+
+    def watch_epoch(self, message: Posterior | Prediction) -> bool:
+        """Whether the message's epoch is the newest of its source; notes when one that was relied on is abandoned."""
+        if message.epoch < self.epoch_of(message.src):
+            return False
+        self._epochs[message.src] = message.epoch
+        if message.epoch > self._relied.get(message.src, message.epoch):
+            self.abandoned = message.src
+        return True
+
+    def epoch_of(self, source: str) -> int:
+        """The newest known epoch of a source."""
+        return self._epochs.get(source, 0)
+
+    def rely(self, message: Posterior | Prediction) -> None:
+        """Note that a message's set went into the own one, with its epoch and its guarantee."""
+        self._relied[message.src] = max(message.epoch, self._relied.get(message.src, 0))
+        self.weaken(message.guarantee)
+
+    def weaken(self, guarantee: Guarantee) -> None:
+        """The set is from now on no better than this."""
+        order = ("declared", "learned", "none")
+        if order.index(guarantee) > order.index(self.guarantee):
+            self.guarantee = guarantee
+
+    def inputs(self) -> dict[int, Input]:
+        """The inputs that are remembered, by step."""
+        return {k: step.input for k, step in self._steps.items() if step.input is not None}
 
     def _see(self, k: int, now: int) -> Step | None:
         """The record of step k, or None when it lies before all that is remembered."""
         if self.current is not None and k < self.current - self.history:
             return None
+        self._heard_at = now
         if k > self._newest:
             self._newest = k
         if self._first_evidence is None:
@@ -306,7 +356,7 @@ class Estimator(Node):
         candidate = self._candidate
         if candidate is None or self._input_missing(candidate.step):
             return False
-        self.epoch = max(self.epoch, candidate.epoch if candidate.src == f"{self.role}/{self.name}" else 0)
+        self.rely(candidate)
         self._begin(candidate.step, to_support(candidate.support), candidate.reference, restarted=True)
         return True
 
@@ -332,6 +382,8 @@ class Estimator(Node):
         """Note that the engine now holds a set made from ``base`` alone; what was before is never used again."""
         self.epoch += 1
         self._counts["resets"] += 1
+        self.guarantee, self.abandoned = "declared", None
+        self._relied.clear()
         self._base, self._used, self._restarted = base, (), True
         for step in self._steps.values():
             step.before = None

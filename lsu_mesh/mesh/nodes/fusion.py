@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.lsucz import LSUCZ
+from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
 from lsu_mesh.mesh.nodes.estimator import Combined, Estimator, Status, Step, finite_or_none
@@ -16,6 +17,10 @@ from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
+
+About = dict[str, str | int | float | None]
+SILENT_STEPS = 5
+"""After so many steps without any message, a second at least, the fusion goes on by the clock."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,43 @@ class Source:
     def bounds(self) -> tuple[Vector, Vector]:
         """The bounds that the filter published."""
         return np.array(self.message.lower), np.array(self.message.upper)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a step's sources."""
+
+    status: Status
+    used: Sequence[Source]
+    cause: str | None = None
+    messages: list[Message] = field(default_factory=list)
+
+
+class Quarantine:
+    """Names the sources that are left out again and again.
+
+    It changes no set: a quarantined source still counts among the m of which ``faults`` may lie, because it may be
+    right again while another one begins to lie.
+    """
+
+    def __init__(self, sources: Sequence[str], after: int) -> None:
+        self._after = after
+        self._run = dict.fromkeys(sources, 0)
+        """Steps in a row that a source was left out (positive) or agreed (negative)."""
+        self.members: set[str] = set()
+
+    def note(self, left_out: set[str], say: Callable[[str, bool], Message]) -> list[Message]:
+        """Count one step; the events of who goes in and who comes out."""
+        messages = []
+        for name, run in self._run.items():
+            self._run[name] = max(run, 0) + 1 if name in left_out else min(run, 0) - 1
+            if self._run[name] >= self._after and name not in self.members:
+                self.members.add(name)
+                messages.append(say(name, True))
+            elif self._run[name] <= -self._after and name in self.members:
+                self.members.remove(name)
+                messages.append(say(name, False))
+        return messages
 
 
 class FusionNode(Estimator):
@@ -49,7 +91,8 @@ class FusionNode(Estimator):
         self._met: tuple[Vector, Vector] = engine.bounds()
         """Bounds of the set met with those of every accepted source."""
         self._rejected: list[Rejection] = []
-        self._learned = False
+        self._quarantine = Quarantine(self.sources, self.settings.quarantine_after)
+        self._counts["silent steps"] = 0
         self.last: dict[str, Posterior] = {}
         """Last sound posterior of each source, for those that ask for it."""
 
@@ -62,7 +105,8 @@ class FusionNode(Estimator):
         return self.settings.max_lag
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
-        listed = [("posterior", name) for name in self.configuration.fusion[self.name].sources]
+        fusions = self.configuration.fusion
+        listed = [("fused" if name in fusions else "posterior", name) for name in fusions[self.name].sources]
         if self.configuration.plant is not None and self.configuration.base_model.input_count:
             listed.append(("input", self.configuration.plant.name))
         return listed
@@ -76,6 +120,8 @@ class FusionNode(Estimator):
 
     def _receive_posterior(self, message: Posterior, now: int) -> None:
         name = message.name
+        if not self.watch_epoch(message):
+            return
         if message.status in ("ok", "predicted"):
             known = self.last.get(name)
             if known is None or message.step >= known.step:
@@ -86,6 +132,23 @@ class FusionNode(Estimator):
         if old is None or old.boot != message.boot or old.seq < message.seq:
             self.take(name, message, now)
 
+    def advance(self, now: int) -> list[Message]:
+        self._sense_silence(now)
+        return super().advance(now)
+
+    def _sense_silence(self, now: int) -> None:
+        """When nothing at all has come for a while, steps go on by the clock; the set then grows, honestly."""
+        if self.current is None or self._heard_at is None or self.waiting_for():
+            return
+        period = SECOND / self.configuration.mesh.rate
+        silence = max(SECOND, int(SILENT_STEPS * period)) + self.deadline
+        last = self.configuration.mesh.steps
+        while now - self._heard_at > silence and (last is None or self._newest < last):
+            heard_at = self._heard_at + int(period)
+            self._see(self._newest + 1, now)
+            self._heard_at = heard_at
+            self._counts["silent steps"] += 1
+
     # -- fusion of one step
 
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
@@ -93,29 +156,20 @@ class FusionNode(Estimator):
         sources = self._sound_sources(step)
         missing = [name for name in self.sources if name not in step.arrived]
         self._met = self.engine.bounds()
-        if not sources:
-            return Combined("predicted", [], missing, None), []
-        before, met = self.engine.snapshot(), self._met
-        messages: list[Message] = []
-        status: Status = "ok"
-        cause: str | None = None
-        if self._try_all(sources):
-            accepted = sources
-        elif self._restart(sources):
-            accepted, status, cause = sources, "restarted", "own prediction was disjoint from what the sources agree on"
-            self.begin_epoch(sources[0].message.reference)
-            messages.append(self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now, k, {"step": k}))
+        if self.settings.policy == "relaxed" and len(sources) > self.settings.faults:
+            outcome = self._relaxed(k, sources, now)
+        elif self.settings.policy == "intersect" and sources:
+            outcome = self._intersected(k, sources, now)
         else:
-            self.engine.restore(before)
-            self._met = met
-            accepted = [source for source in sources if self._try(source)]
-            status = "ok" if accepted else "inconsistent"
-            cause = "sources contradict one another"
-            messages += self._name_rejected(k, sources, accepted, now)
-        self._learned = self._learned or any(source.message.guarantee == "learned" for source in accepted)
-        origin = min((source.message.origin_ns for source in accepted), default=None)
-        used = [source.message.reference for source in accepted]
-        return Combined(status, used, missing, origin, cause), messages
+            return Combined("predicted", [], missing, None), []
+        for source in outcome.used:
+            if self.settings.policy == "intersect":
+                self.rely(source.message)
+            else:  # no single source carries a relaxed set: one that abandons its epoch was allowed to be wrong
+                self.weaken(source.message.guarantee)
+        origin = min((source.message.origin_ns for source in outcome.used), default=None)
+        used = [source.message.reference for source in outcome.used]
+        return Combined(outcome.status, used, missing, origin, outcome.cause), outcome.messages
 
     def _sound_sources(self, step: Step) -> list[Source]:
         sources = []
@@ -123,24 +177,70 @@ class FusionNode(Estimator):
             message = step.arrived.get(name)
             if not isinstance(message, Posterior):
                 continue
-            if message.status in ("ok", "predicted"):
+            if message.epoch < self.epoch_of(message.src):
+                self._rejected.append(Rejection(source=name, reason=f"epoch {message.epoch} was abandoned"))
+            elif message.status in ("ok", "predicted"):
                 sources.append(Source(name, message, to_support(message.support)))
             else:
                 self._rejected.append(Rejection(source=name, reason=f"status {message.status}"))
         return sources
+
+    def _intersected(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
+        """Every source with the own prediction; without the prediction where only that is wrong."""
+        before, met = self.engine.snapshot(), self._met
+        if self.abandoned is None and self._try_all(sources):
+            return Outcome("ok", sources, None, self._name_rejected(k, [], now))
+        self.engine.restore(before)
+        if self._restart(sources):
+            return self._without_prediction(k, sources, now)
+        self.engine.restore(before)
+        self._met = met
+        accepted = [source for source in sources if self._try(source)]
+        messages = self._name_rejected(k, [source for source in sources if source not in accepted], now)
+        return Outcome("ok" if accepted else "inconsistent", accepted, "sources contradict one another", messages)
+
+    def _relaxed(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
+        """What holds the state as long as at most ``faults`` of the sources are wrong."""
+        try:
+            together = fuse([source.support for source in sources], "relaxed", self.settings.faults)
+        except InconsistentData:
+            cause = f"more than {self.settings.faults} of the sources contradict one another"
+            about: About = {"step": k, "faults": self.settings.faults}
+            event = self.event("ERROR", "too-many-faults", f"step {k}: {cause}", now, k, about)
+            return Outcome("inconsistent", [], cause, [event])
+        messages = self._name_rejected(k, [sources[i] for i in together.rejected], now)
+        if self.abandoned is None and self._meet(together.support, together.bounds):
+            return Outcome("ok", sources, None, messages)
+        self.engine.reset(together.support)
+        self._met = together.bounds
+        outcome = self._without_prediction(k, sources, now)
+        return Outcome(outcome.status, outcome.used, outcome.cause, [*messages, *outcome.messages])
+
+    def _without_prediction(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
+        """The engine holds what the sources say alone: a new epoch begins."""
+        if self.abandoned is None:
+            cause = "own prediction was disjoint from what the sources agree on"
+        else:
+            cause = f"{self.abandoned} has abandoned its epoch"
+        self.begin_epoch(sources[0].message.reference)
+        event = self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now, k, {"step": k})
+        return Outcome("restarted", sources, cause, [event])
 
     def _try_all(self, sources: Sequence[Source]) -> bool:
         return all(self._try(source) for source in sources)
 
     def _try(self, source: Source) -> bool:
         """Meet the set with one source; False, and unchanged, where the intersection is proved empty."""
-        lower = np.maximum(self._met[0], source.bounds[0])
-        upper = np.minimum(self._met[1], source.bounds[1])
+        return self._meet(source.support, source.bounds)
+
+    def _meet(self, support: Support, bounds: tuple[Vector, Vector]) -> bool:
+        """Meet the set with another one; False, and unchanged, where the intersection is proved empty."""
+        lower, upper = np.maximum(self._met[0], bounds[0]), np.minimum(self._met[1], bounds[1])
         if (lower > upper).any():
             return False
         before = self.engine.snapshot()
         try:
-            self.engine.condition(source.support)
+            self.engine.condition(support)
         except InconsistentData:
             return False
         own_lower, own_upper = self.engine.bounds()
@@ -158,17 +258,28 @@ class FusionNode(Estimator):
         self._met = first.bounds
         return self._try_all(others)
 
-    def _name_rejected(self, k: int, sources: Sequence[Source], accepted: Sequence[Source], now: int) -> list[Message]:
+    def _name_rejected(self, k: int, rejected: Sequence[Source], now: int) -> list[Message]:
+        """Events and counts of the sources that were left out; who is left out often is quarantined."""
         messages: list[Message] = []
-        self._counts["contradictions"] += 1
-        for source in sources:
-            if source not in accepted:
-                reason = "disjoint from the own prediction and the sources accepted before"
-                self._rejected.append(Rejection(source=source.name, reason=reason))
-                about: dict[str, str | int | float | None] = {"source": source.name, "step": k}
-                text = f"step {k}: {source.name} is {reason}; left out"
-                messages.append(self.event("WARN", "source-rejected", text, now, k, about))
-        return messages
+        names = {source.name for source in rejected}
+        for name in sorted(names):
+            reason = "contradicts what the other sources and the own prediction agree on"
+            self._rejected.append(Rejection(source=name, reason=reason))
+            self._counts["contradictions"] += 1
+            text = f"step {k}: {name} {reason}; left out"
+            messages.append(self.event("WARN", "source-rejected", text, now, k, {"source": name, "step": k}))
+        return [*messages, *self._quarantine.note(names, self._say_quarantine(k, now))]
+
+    def _say_quarantine(self, k: int, now: int) -> Callable[[str, bool], Message]:
+        def say(name: str, is_in: bool) -> Message:
+            count = self.settings.quarantine_after
+            if is_in:
+                text = f"step {k}: {name} was left out {count} times in a row and is quarantined"
+                return self.event("ERROR", "quarantined", text, now, k, {"source": name, "step": k})
+            text = f"step {k}: {name} has agreed {count} times in a row and is let back in"
+            return self.event("INFO", "let-back-in", text, now, k, {"source": name, "step": k})
+
+        return say
 
     # -- messages out
 
@@ -186,14 +297,14 @@ class FusionNode(Estimator):
             status=combined.status,
             revision=step.revision,
             epoch=self.epoch,
-            guarantee="learned" if self._learned else "declared",
+            guarantee=self.guarantee,
             base=self._base,
             used=list(combined.used),
             bounds=self.noise_bounds(),
             missing=list(combined.missing),
             cause=combined.cause,
-            policy="intersect",
+            policy=self.settings.policy,  # type: ignore[arg-type]
             faults=self.settings.faults,
             rejected=self._rejected,
-            quarantined=[],
+            quarantined=sorted(self._quarantine.members),
         )

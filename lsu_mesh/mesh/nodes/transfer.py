@@ -1,0 +1,99 @@
+"""Bayesian transfer into a filter node: what others know about the state, intersected with the own prediction.
+
+Three ways (Kuklišová Pavelková, Jirsa, Quinn 2022, and the design of this mesh):
+
+``predictor``
+    The supports of the other filters' state predictors of the same step. Conditioning on their intersection minimises
+    the Kullback–Leibler divergence; the minimum ``ln vol X − ln vol (X ∩ X_1 ∩ …)`` is the gain in nats.
+``fused``
+    The newest fused box of an earlier step, carried forward by the model.
+``data-predictor``
+    The strip ``ŷ_hi − r ≤ C x ≤ ŷ_lo + r`` from a source's output predictor. Formally optimal, but it can cut off the
+    truth: sets that used it carry ``guarantee = "none"``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from lsu_mesh.errors import InconsistentData
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.lsuo import LSUO
+from lsu_mesh.mesh.config.settings import Configuration, FilterSettings
+from lsu_mesh.mesh.messages import Fused, Input, Message, Prediction
+from lsu_mesh.mesh.sets import to_support
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.support import Support
+
+SOUND = ("ok", "predicted")
+OLDEST_BOX = 16
+"""A fused box that is older than so many steps is not carried forward any more."""
+
+
+class Transfer:
+    """Keeps what came from others and turns it into sets of a step."""
+
+    def __init__(self, configuration: Configuration, settings: FilterSettings) -> None:
+        self._configuration = configuration
+        self.way = settings.transfer
+        self._predictions: dict[int, dict[str, Prediction]] = {}
+        self._fused: dict[int, dict[str, Fused]] = {}
+
+    def note(self, message: Message) -> None:
+        """Remember a prediction or a fused set."""
+        if isinstance(message, Prediction) and self.way in ("predictor", "data-predictor"):
+            self._predictions.setdefault(message.step, {})[message.name] = message
+        elif isinstance(message, Fused) and self.way == "fused" and message.status in SOUND:
+            self._fused.setdefault(message.step, {})[message.name] = message
+
+    def forget_before(self, k: int) -> None:
+        """Drop what belongs to steps before k."""
+        for kept in (self._predictions, self._fused):
+            for old in [step for step in kept if step < k]:
+                del kept[old]
+
+    def forget_source(self, name: str) -> None:
+        """Drop everything that came from one source: its epoch was abandoned."""
+        for predictions in self._predictions.values():
+            predictions.pop(name, None)
+        for boxes in self._fused.values():
+            boxes.pop(name, None)
+
+    def available(self, k: int, inputs: Mapping[int, Input], *, needs_inputs: bool) -> Sequence[Prediction | Fused]:
+        """What can be brought to the prediction of step k, sources by name."""
+        if self.way in ("predictor", "data-predictor"):
+            return [message for _, message in sorted(self._predictions.get(k, {}).items())]
+        for j in range(k - 1, max(0, k - 1 - OLDEST_BOX), -1):
+            if needs_inputs and j not in inputs:
+                return []
+            if self._fused.get(j):
+                return [message for _, message in sorted(self._fused[j].items())]
+        return []
+
+    def as_set(self, message: Prediction | Fused, k: int, engine: Filter, inputs: Mapping[int, Input]) -> Support:
+        """The set of step k that a message stands for; ``InconsistentData`` for an empty strip."""
+        if isinstance(message, Fused):
+            return self._carried(message, k, engine, inputs)
+        if self.way == "predictor":
+            return to_support(message.support)
+        return self._strip(message, engine)
+
+    def _carried(self, message: Fused, k: int, engine: Filter, inputs: Mapping[int, Input]) -> Support:
+        box = LSUO(engine.model, Orthotope(message.lower, message.upper))
+        for j in range(message.step, k):
+            box.predict(np.array(inputs[j].u) if engine.model.input_count else None)
+        return box.support
+
+    def _strip(self, message: Prediction, engine: Filter) -> Support:
+        model = self._configuration.model(self._configuration.filters[message.name].sensors)
+        lower = np.array(message.y_upper) - model.r
+        upper = np.array(message.y_lower) + model.r
+        empty = lower > upper
+        if empty.any():
+            row = int(np.flatnonzero(empty)[0])
+            raise InconsistentData(f"the output predictor of {message.name} is wider than 2 r", rows=(row,))
+        return engine.support.to_constrained_zonotope().meet_strips(
+            model.C, 0.5 * (lower + upper), 0.5 * (upper - lower)
+        )

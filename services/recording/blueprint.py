@@ -1,0 +1,136 @@
+"""What opens first: one tab for the overview, one per filter, then fusion, outputs, mesh and events.
+
+Views are built in functions, because a view object that is used twice makes the viewer warn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import rerun.blueprint as rrb
+
+from services.recording import frame
+from services.recording.names import Names, Output, path
+from services.recording.timeline import STEP
+
+OVERVIEW_STATES = 6
+"""States that the overview shows; all of them have their own tab where there are more."""
+Part = rrb.View | rrb.Container
+
+
+def blueprint(names: Names) -> rrb.Blueprint:
+    """The default blueprint of a mesh."""
+    configuration = names.configuration
+    tabs: list[Part] = [_overview(names)]
+    if len(names.states) > OVERVIEW_STATES:
+        tabs.append(_grid("States", [_bands(names, i) for i in range(len(names.states))]))
+    tabs += [_filter(names, name, settings.kind) for name, settings in configuration.filters.items()]
+    tabs += [_fusion(names, name) for name in configuration.fusion]
+    tabs += [_grid("Outputs", [_output(output) for output in names.outputs]), _mesh(), _events()]
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=STEP, play_state="following"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _overview(names: Names) -> Part:
+    shown = list(range(len(names.states)))
+    if len(shown) > OVERVIEW_STATES:
+        shown = list(dict.fromkeys([*names.axes(), *shown]))[:OVERVIEW_STATES]
+    plots = [_bands(names, i) for i in shown]
+    left = rrb.Vertical(_space(names, frame.ALL, ["/space/sets/**"]), _status(), row_shares=[4, 1])
+    right = [*plots, _plot("Log-volume of the sets", ["/log_volume/**"])]
+    columns = 1 if len(right) <= 4 else 2
+    return rrb.Horizontal(left, rrb.Grid(*right, grid_columns=columns), column_shares=[2, 3], name="Overview")
+
+
+def _filter(names: Names, name: str, kind: str) -> Part:
+    left = rrb.Vertical(
+        _space(names, name, [f"{path('space', 'sets', name)}/**"]),
+        _plot("Widths", [path("widths", name)]),
+        row_shares=[3, 1],
+    )
+    return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=f"{name} ({kind})")
+
+
+def _fusion(names: Names, name: str) -> Part:
+    several = len(names.configuration.fusion) > 1
+    left = rrb.Vertical(
+        _space(names, name, ["/space/sets/**"]),
+        _plot("Log-volume of the sets", ["/log_volume/**"]),
+        rrb.StateTimelineView(name="Sources", origin="/", contents=[f"{path('trust', name)}/**"]),
+        row_shares=[4, 2, 1.2],
+    )
+    title = f"Fusion {name}" if several else "Fusion"
+    return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=title)
+
+
+def _states_of(names: Names, peer: str) -> Part:
+    """Band and error of every state, side by side where there is room, else in tabs."""
+    count = len(names.states)
+    bands = [_bands(names, i, peer) for i in range(count)]
+    errors = [_errors(names, i, peer) for i in range(count)]
+    if count <= 4:
+        return rrb.Grid(*(view for pair in zip(bands, errors, strict=True) for view in pair), grid_columns=2)
+    return rrb.Tabs(_grid("Bands", bands), _grid("Errors", errors), active_tab=0)
+
+
+def _mesh() -> Part:
+    health = rrb.StateTimelineView(name="Processes", origin="/", contents=["/health/**"])
+    latency = _plot("Age of the oldest measurement at arrival [ms]", ["/latency/**"])
+    topology = rrb.GraphView(name="Who sends to whom", origin="/topology")
+    left = rrb.Vertical(topology, latency, row_shares=[3, 2])
+    right = rrb.Vertical(_status(), health, row_shares=[1, 2])
+    return rrb.Horizontal(left, right, column_shares=[1, 1], name="Mesh")
+
+
+def _events() -> Part:
+    return rrb.TextLogView(name="Events", origin="/events")
+
+
+def _grid(name: str, views: Sequence[Part]) -> Part:
+    columns = 1 if len(views) <= 3 else 2 if len(views) <= 8 else 3
+    return rrb.Grid(*views, grid_columns=columns, name=name)
+
+
+def _bands(names: Names, state: int, peer: str | None = None) -> Part:
+    part = names.states[state]
+    shown = f"{path('bands', part)}/**" if peer is None else path("bands", part, peer)
+    return _plot(names.label(state), [shown, path("truth", part)])
+
+
+def _errors(names: Names, state: int, peer: str) -> Part:
+    part = names.states[state]
+    return _plot(f"{names.label(state)} − truth", [path("errors", part, peer)])
+
+
+def _output(output: Output) -> Part:
+    contents = [output.measured(), f"{path('outputs', output.sensor, output.part)}/**"]
+    return _plot(f"{output.label}: measured, and predicted by the filters", contents)
+
+
+def _status() -> Part:
+    return rrb.StateTimelineView(name="Status of the sets", origin="/", contents=["/status/**"])
+
+
+def _plot(name: str, contents: list[str]) -> Part:
+    link = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
+    return rrb.TimeSeriesView(name=name, origin="/", contents=contents, axis_x=link)
+
+
+def _space(names: Names, name: str, sets: list[str]) -> Part:
+    axes = [names.states[axis] for axis in names.axes()]
+    origin = frame.entity(name)
+    title = f"Sets of {', '.join(axes)}"
+    if len(axes) < 3:  # from the top
+        eye = rrb.EyeControls3D(position=(0.0, 0.0, 3.6), look_target=(0.0, 0.0, 0.0), eye_up=(0.0, 1.0, 0.0))
+        grid = rrb.LineGrid3D(visible=False)
+    else:
+        eye = rrb.EyeControls3D(position=(2.0, -3.4, 1.9), look_target=(0.0, 0.0, -0.1), eye_up=(0.0, 0.0, 1.0))
+        grid = rrb.LineGrid3D(visible=False)
+    contents = [*sets, "/space/truth", f"{origin}/**"]
+    return rrb.Spatial3DView(name=title, origin=origin, contents=contents, eye_controls=eye, line_grid=grid)

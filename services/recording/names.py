@@ -1,0 +1,106 @@
+"""Where things lie in a recording, and how they are called there.
+
+=====================================  ===================================================================
+``/raw/<topic>/<name>``                every message as it came: payload, key, arrival
+``/raw/refused``                       payloads that are no message of this mesh
+``/truth/<state>``                     true state
+``/bands/<state>/<peer>``              interval, with lower, point and upper, of a filter or a fusion
+``/errors/<state>/<peer>``             point − truth, lower − truth, upper − truth
+``/widths/<peer>``                     widths of the interval hull, one series per state
+``/log_volume/<peer>``                 natural logarithm of the volume
+``/measured/<sensor>/<output>``        measured outputs
+``/outputs/<sensor>/<output>/<peer>``  predicted interval of the output
+``/space/sets/<peer>``                 set in three coordinates, ``…/edges`` its edges
+``/space/truth``                       the true state among the sets
+``/space/frames/<peer>``               place and scale at which views look, ``…/axes`` the axes
+``/status/<peer>``                     status of the posterior; ``/health/<peer>`` how the process does
+``/trust/<fusion>/<source>``           what the fusion does with a source
+``/topology``                          peers and who listens to whom
+``/events/<peer>``                     events as text
+``/latency/<peer>``                    age of the oldest measurement at the arrival of the posterior, in ms
+=====================================  ===================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import rerun as rr
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.config.settings import SensorSettings
+
+
+def path(*parts: str) -> str:
+    """Entity path of the parts, each escaped."""
+    return str(rr.new_entity_path(list(parts)))
+
+
+def told_apart(names: Sequence[str]) -> tuple[str, ...]:
+    """The names; each with its number behind where one is empty or occurs twice."""
+    if all(names) and len(set(names)) == len(names):
+        return tuple(names)
+    return tuple(f"{name}#{i + 1}" for i, name in enumerate(names))
+
+
+@dataclass(frozen=True)
+class Output:
+    """One row of C of a sensor: its place in the sensor's y, its name in entity paths and for people."""
+
+    sensor: str
+    row: int
+    part: str
+    label: str
+
+    def measured(self) -> str:
+        """Entity of the measured values."""
+        return path("measured", self.sensor, self.part)
+
+    def predicted(self, peer: str) -> str:
+        """Entity of the interval that a filter predicts."""
+        return path("outputs", self.sensor, self.part, peer)
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names that a configuration gives to what is drawn."""
+
+    configuration: Configuration
+    states: tuple[str, ...] = field(init=False)
+    """Entity path part of each state."""
+    estimators: tuple[str, ...] = field(init=False)
+    """Filters and fusion peers."""
+    outputs: tuple[Output, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        configuration = self.configuration
+        object.__setattr__(self, "states", told_apart(configuration.base_model.states))
+        object.__setattr__(self, "estimators", (*configuration.filters, *configuration.fusion))
+        listed = [output for sensor in configuration.sensors.values() for output in outputs_of(sensor)]
+        object.__setattr__(self, "outputs", tuple(listed))
+
+    def label(self, state: int) -> str:
+        """Name of a state with its unit, such as ``position [m]``."""
+        unit = self.configuration.base_model.units[state]
+        return f"{self.states[state]} [{unit}]" if unit else self.states[state]
+
+    def axes(self) -> tuple[int, ...]:
+        """The states that span the 3-D views: ``recorder.axes`` where it names any, else the first three."""
+        states = self.configuration.base_model.states
+        chosen = [states.index(name) for name in self.configuration.recorder.axes if name in states]
+        return tuple(dict.fromkeys(chosen))[:3] or tuple(range(min(3, len(states))))
+
+    def outputs_of_filter(self, name: str) -> tuple[Output, ...]:
+        """Outputs in the order of a filter's rows of C: sensors by name, then rows."""
+        chosen = self.configuration.filters[name].sensors
+        return tuple(output for sensor in sorted(chosen) for output in self.outputs if output.sensor == sensor)
+
+
+def outputs_of(sensor: SensorSettings) -> list[Output]:
+    """The outputs of one sensor."""
+    parts = told_apart(sensor.outputs)
+    return [
+        Output(sensor.name, row, part, part if part == sensor.name else f"{sensor.name}: {part}")
+        for row, part in enumerate(parts)
+    ]

@@ -1,0 +1,51 @@
+"""Reading raw payloads back, bit by bit, also from a recording whose writer was killed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import pyarrow as pa
+from rerun.chunk import RrdReader
+
+from services.recording.raw import ARCHETYPE, REFUSED
+
+
+class RawMessage(NamedTuple):
+    """One message as the recorder received it."""
+
+    key: str
+    arrival_ns: int
+    payload: bytes
+
+
+def read_raw(path: Path, *, refused: bool = False) -> list[RawMessage]:
+    """The accepted messages of a recording in the order of arrival; ``refused=True``: all payloads, also those refused.
+
+    Raises ``FileNotFoundError``, or ``ValueError`` where the file is no recording.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(2, "no such recording", str(path))
+    rows: list[tuple[int, RawMessage]] = []
+    try:
+        for chunk in RrdReader(path).stream().filter(content="/raw/**"):
+            if refused or chunk.entity_path != REFUSED:
+                rows += _rows(chunk.to_record_batch())
+    except (RuntimeError, OSError) as error:
+        raise ValueError(f"{path} cannot be read as a recording: {error}") from error
+    rows.sort(key=lambda row: row[0])
+    return [message for _, message in rows]
+
+
+def _rows(batch: pa.RecordBatch) -> list[tuple[int, RawMessage]]:
+    values = {name: _flat(batch.column(f"{ARCHETYPE}:{name}")) for name in ("number", "key", "arrival_ns", "payload")}
+    return [
+        (number, RawMessage(key, arrival, payload))
+        for number, key, arrival, payload in zip(
+            values["number"], values["key"], values["arrival_ns"], values["payload"], strict=True
+        )
+    ]
+
+
+def _flat(column: pa.Array) -> list[object]:
+    return column.flatten().to_pylist()

@@ -1,0 +1,155 @@
+"""The recorder: everything that comes goes into one file, raw and drawn."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Truth
+from services.recording import palette
+from services.recording.estimates import Estimates
+from services.recording.events import Events
+from services.recording.names import Names
+from services.recording.outputs import Outputs
+from services.recording.raw import RawStore
+from services.recording.space import Space
+from services.recording.status import StatusLanes
+from services.recording.stream import open_stream
+from services.recording.timeline import Moment, Timelines
+from services.recording.topology import Topology
+
+NOTHING: Mapping[str, str] = MappingProxyType({})
+FLUSH_TIMEOUT_S = 10.0
+
+
+class Recorder:
+    """Owns one recording.
+
+    Parameters
+    ----------
+    configuration:
+        The mesh; gives names, units, colours and layout.
+    path:
+        A new ``.rrd`` file.
+    run_properties:
+        Stored with the recording beside what it tells of itself (configuration, model, seed, versions, processor).
+    serve_port:
+        Port of the loopback on which viewers may follow; ``None``: no network.
+
+    Raises
+    ------
+    OSError
+        The file exists already or cannot be written.
+
+    After that nothing is raised: what cannot be drawn is counted in :attr:`problems`, and its payload is stored all the same.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        path: Path,
+        *,
+        run_properties: Mapping[str, str] = NOTHING,
+        serve_port: int | None = None,
+    ) -> None:
+        names, timelines = Names(configuration), Timelines(configuration.mesh.dt)
+        colors = palette.colors(configuration)
+        self.path = path
+        self.flushed: dict[str, int] = {}
+        """Per key the last ``seq`` that is known to be in the file."""
+        self._stream = stream = open_stream(names, path, run_properties, serve_port)
+        self._raw = RawStore(stream, timelines)
+        self._estimates = Estimates(stream, timelines, names, colors)
+        self._space = Space(stream, timelines, names, colors)
+        self._outputs = Outputs(stream, timelines, names, colors)
+        self._status = StatusLanes(stream, timelines, configuration)
+        self._events = Events(stream, timelines)
+        self._topology = Topology(stream, timelines, configuration, colors)
+        self._interval_ns = int(configuration.recorder.flush * 1e9)
+        self._next_flush_ns = 0
+        self._latest_step = 0
+        self._unflushed: dict[str, int] = {}
+        self._counts: Counter[str] = Counter()
+        self._closed = False
+
+    @property
+    def problems(self) -> list[str]:
+        """What went wrong so far, each kind once with its count."""
+        return [text if count == 1 else f"{text} ({count} times)" for text, count in self._counts.items()]
+
+    def record(self, key: str, payload: bytes, arrival_ns: int, message: Message | None) -> None:
+        """Keep a payload, and draw its message; ``None`` where the payload was refused."""
+        self._raw.add(key, payload, arrival_ns, message)
+        if message is not None:
+            self._unflushed[key] = message.seq
+            self._guarded(f"drawing {message.topic} of {message.src}", lambda: self._draw(message, arrival_ns))
+
+    def peer_changed(self, role: str, name: str, alive: bool, now_ns: int) -> None:
+        """A peer came or went."""
+        self._guarded(f"drawing the presence of {name}", lambda: self._draw_presence(role, name, alive, now_ns))
+
+    def tick(self, now_ns: int) -> None:
+        """Flush when the interval is over."""
+        if now_ns >= self._next_flush_ns:
+            self._next_flush_ns = now_ns + self._interval_ns
+            self.flush()
+
+    def flush(self) -> None:
+        """Write everything that waits to the file."""
+        unflushed, self._unflushed = self._unflushed, {}
+        stored = self._guarded("storing raw payloads", self._raw.flush)
+        for part in (self._estimates, self._space, self._outputs, self._status, self._events, self._topology):
+            self._guarded(f"drawing {type(part).__name__.lower()}", part.flush)
+        written = self._guarded("writing the file", lambda: self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S))
+        if stored and written:
+            self.flushed |= unflushed
+
+    def close(self) -> None:
+        """Flush, and end the file with its footer; the second call does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        self.flush()
+        self._guarded("closing the file", self._stream.disconnect)
+
+    def _draw(self, message: Message, arrival_ns: int) -> None:
+        moment = Moment(message.step, arrival_ns)
+        self._latest_step = max(self._latest_step, message.step)
+        if isinstance(message, Posterior):
+            self._estimates.add(message, arrival_ns)
+            self._space.add(message, arrival_ns)
+            self._status.add(message, arrival_ns)
+        elif isinstance(message, Truth):
+            self._estimates.add_truth(message, arrival_ns)
+            self._space.add_truth(message, arrival_ns)
+        elif isinstance(message, Measurement):
+            self._outputs.add_measurement(message, arrival_ns)
+        elif isinstance(message, Prediction):
+            self._outputs.add_prediction(message, arrival_ns)
+        elif isinstance(message, Health):
+            self._status.add_health(message, self._now(arrival_ns))
+        elif isinstance(message, Event):
+            self._events.add(message, moment if message.step else self._now(arrival_ns))
+
+    def _draw_presence(self, role: str, name: str, alive: bool, now_ns: int) -> None:
+        now = self._now(now_ns)
+        self._status.peer_changed(name, alive, now)
+        self._topology.peer_changed(role, name, alive, now)
+        self._events.tell(name, now, "INFO" if alive else "WARN", f"{role} {name} {'is there' if alive else 'is gone'}")
+
+    def _now(self, now_ns: int) -> Moment:
+        """The moment of what belongs to no step of its own."""
+        return Moment(self._latest_step, now_ns)
+
+    def _guarded(self, doing: str, work: Callable[[], None]) -> bool:
+        """Do the work; an error becomes a counted problem. The recording of everything else must go on."""
+        try:
+            work()
+        except Exception as error:
+            self._counts[f"{doing}: {type(error).__name__}: {error}"] += 1
+            return False
+        return True

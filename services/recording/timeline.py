@@ -1,0 +1,52 @@
+"""The three timelines: ``step``, ``sim_time`` (step · dt) and ``wall_time`` (arrival at the recorder)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import rerun as rr
+
+STEP, SIM_TIME, WALL_TIME = "step", "sim_time", "wall_time"
+LAST_NS = 2**63 - 1
+
+
+class Moment(NamedTuple):
+    """When something is drawn: the step that it is about and the arrival in nanoseconds since 1970."""
+
+    step: int
+    wall_ns: int
+
+
+@dataclass(frozen=True)
+class Timelines:
+    """Time columns of rows; dt in seconds."""
+
+    dt: float
+
+    def columns(self, moments: Sequence[Moment]) -> list[rr.TimeColumn]:
+        """One column per timeline."""
+        steps = np.array([moment.step for moment in moments], dtype=np.int64)
+        seconds = np.minimum(steps * self.dt, 9e9)  # 285 years; a step far beyond the run must not overflow
+        simulated = np.rint(seconds * 1e9).astype(np.int64)
+        return [
+            rr.TimeColumn(STEP, sequence=steps),
+            rr.TimeColumn(SIM_TIME, duration=simulated.astype("timedelta64[ns]")),
+            wall_column([moment.wall_ns for moment in moments]),
+        ]
+
+
+def wall_column(wall_ns: Sequence[int]) -> rr.TimeColumn:
+    """The column of arrivals alone, for what belongs to no step."""
+    return rr.TimeColumn(WALL_TIME, timestamp=np.array(wall_ns, dtype=np.int64).astype("datetime64[ns]"))
+
+
+def one_row(archetype: rr.AsComponents) -> list[rr.ComponentColumn]:
+    """An archetype as columns of a single row."""
+    batches = archetype.as_component_batches()
+    return [
+        rr.ComponentColumn(batch.component_descriptor(), batch, lengths=[len(batch.as_arrow_array())])
+        for batch in batches
+    ]
