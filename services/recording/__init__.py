@@ -1,4 +1,5 @@
-"""The recording of a mesh as a Rerun file: raw payloads, which machines recompute, and drawings, which people look at.
+"""The recording of a mesh as a Rerun file: raw payloads to compute with, drawings to look at.
 
-The only folder that imports rerun. What lies where in a recording stands in ``names.py``, what opens first in ``blueprint.py``.
+The only folder that imports rerun. What lies where in a recording stands in ``names.py``, what opens first in
+``blueprint.py``.
 """
