@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -17,7 +16,9 @@ from lsu_mesh.filters.arguments import (
     output_vector,
     same_states,
 )
+from lsu_mesh.filters.contradiction import strip_contradiction
 from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.gain import hull_gain
 from lsu_mesh.kernels.constrained import meet_sets, meet_strips
 from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
 from lsu_mesh.model import LSUModel
@@ -59,8 +60,8 @@ class LSUCZ(Filter):
         Names the option or the prior that is wrong.
 
     Beside the constrained zonotope the filter holds a box: the interval hull *before* each reduction, carried on by
-    interval arithmetic. :meth:`bounds` is the meet of that box and the hull of :attr:`support`, so that a reduction never
-    widens what was known. What is asked of the filter between two steps does not change its later results.
+    interval arithmetic. :meth:`bounds` is the meet of that box and the hull of :attr:`support`, so that a reduction
+    never widens what was known. What is asked of the filter between two steps does not change its later results.
     """
 
     kind: ClassVar[str] = "LSUCZ"
@@ -136,7 +137,9 @@ class LSUCZ(Filter):
             try:
                 self._hold(self._settled(cut, self._held.lower, self._held.upper))
             except InconsistentData as contradiction:
-                raise self._explained(values, widths) from contradiction
+                raise strip_contradiction(
+                    self._model.outputs, *self._noiseless_output(), values, widths
+                ) from contradiction
         return self.support
 
     def predict(
@@ -165,7 +168,7 @@ class LSUCZ(Filter):
     def condition(self, support: Support) -> float:
         """Keep ``X ∩ support``; the gain, in nats, is that of the interval hulls."""
         other = checked_prior(self._model, support)
-        before = np.subtract(*self.bounds())
+        before = self.bounds()
         lower, upper = other.bounds()
         box = np.maximum(self._held.lower, lower), np.minimum(self._held.upper, upper)
         try:
@@ -175,7 +178,7 @@ class LSUCZ(Filter):
             raise InconsistentData(
                 f"the set of {self.kind} and the transferred set have no point in common"
             ) from contradiction
-        return _log_ratio(before, np.subtract(*self.bounds()))
+        return hull_gain(before, self.bounds())
 
     def reset(self, support: Support) -> None:
         """Start again from a set that is known to hold the state now."""
@@ -219,19 +222,6 @@ class LSUCZ(Filter):
         box_low, box_high = image_of_box(self._arrays.C, *self.bounds())
         return np.maximum(low, box_low), np.minimum(high, box_high)
 
-    def _explained(self, y: Vector, r: Vector) -> InconsistentData:
-        """The contradiction, with the rows whose strip alone misses the set."""
-        low, high = self._noiseless_output()
-        gaps = np.fmax(low - (y + r), (y - r) - high)
-        alone = [int(i) for i in np.flatnonzero(gaps > 0)]
-        names = self._model.outputs
-        if alone:
-            listed = ", ".join(f"{names[i]} (by {gaps[i]:.3g})" for i in alone)
-            return InconsistentData(f"outside its predicted interval: {listed}", alone, float(gaps[alone[0]]))
-        rows = [int(i) for i in np.flatnonzero(~np.isnan(y))]
-        listed = ", ".join(names[i] for i in rows)
-        return InconsistentData(f"the strips of {listed} and the prediction have no point in common", rows)
-
 
 def _within(held: Held, domain: Orthotope) -> Held:
     """Meet with the domain; only coordinates in which the set exceeds it cost a generator and a constraint."""
@@ -247,12 +237,3 @@ def _within(held: Held, domain: Orthotope) -> Held:
     if (lower > upper).any() or ConstrainedZonotope.of_arrays(*body).is_empty():
         raise InconsistentData("the prediction is proved to miss the domain")
     return Held(body, lower, upper, is_hull=False)
-
-
-def _log_ratio(before: Vector, after: Vector) -> float:
-    """``ln Π|before| − ln Π|after|`` over the coordinates that had a width; ``inf`` where one has vanished."""
-    before, after = np.abs(before), np.abs(after)
-    had = before > 0
-    if (after[had] == 0).any():
-        return math.inf
-    return max(0.0, float(np.sum(np.log(before[had]) - np.log(after[had]))))

@@ -19,8 +19,8 @@ Vector = NDArray[np.float64]
 class Fusion(NamedTuple):
     """What the sources know together.
 
-    ``support`` holds the state; ``bounds`` (lower, upper) is its interval hull met with the bounds of every accepted source;
-    ``point`` is the centre of the bounds; ``rejected`` are indices of sources that were left out.
+    ``support`` holds the state; ``bounds`` (lower, upper) is its interval hull met with the bounds of every accepted
+    source; ``point`` is the centre of the bounds; ``rejected`` are indices of sources that were left out.
     """
 
     support: Support
@@ -30,7 +30,7 @@ class Fusion(NamedTuple):
 
 
 def fuse(supports: Sequence[Support], policy: str = "intersect", faults: int = 0) -> Fusion:
-    """``∩ supports`` (policy ``"intersect"``), or the hull of all intersections of m − ``faults`` of them (``"relaxed"``).
+    """``∩ supports`` (``"intersect"``), or the hull of all intersections of m − ``faults`` of them (``"relaxed"``).
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def fuse(supports: Sequence[Support], policy: str = "intersect", faults: int = 0
 
 
 def fuse_all(supports: Sequence[Support]) -> Fusion:
-    """``∩ supports`` as a constrained zonotope (a single source keeps its class); ``InconsistentData`` when proved empty."""
+    """``∩ supports``; a single source keeps its class. ``InconsistentData`` where it is proved empty."""
     joint = Intersection(supports)
     try:
         lower, upper = joint.bounds()

@@ -1,9 +1,9 @@
 """The q-relaxed intersection: fusion that holds the state although some sources are wrong.
 
 If at most q of m sources are wrong, the state lies in at least m − q of the sets, hence in one of the intersections of
-m − q of them. The result is the hull of the union of *all* of these that are not proved empty (Jaulin 2009). The largest
-consistent family alone is no guarantee: a wrong source that overlaps the others may join it and cut off the state.
-For many sources the same is done coordinate by coordinate on the bounds (Marzullo 1984).
+m − q of them. The result is the hull of the union of *all* of these that are not proved empty (Jaulin 2009). The
+largest consistent family alone is no guarantee: a wrong source that overlaps the others may join it and cut off the
+state. For many sources the same is done coordinate by coordinate on the bounds (Marzullo 1984).
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ MOST_FAMILIES = 256
 def fuse_relaxed(supports: Sequence[Support], faults: int) -> Fusion:
     """The hull of the union of all intersections of m − ``faults`` sources, for at most ``faults`` wrong ones.
 
-    ``rejected`` are the sources that are *proved* wrong if no more than ``faults`` are: those in no non-empty intersection
-    of m − ``faults`` sources. Raises ``InconsistentData`` where all intersections are proved empty, ``ModelError`` for a
-    number of faults that leaves no source.
+    ``rejected`` are the sources that are *proved* wrong if no more than ``faults`` are: those in no non-empty
+    intersection of m − ``faults`` sources. Raises ``InconsistentData`` where all intersections are proved empty,
+    ``ModelError`` for a number of faults that leaves no source.
     """
     m = len(supports)
     if not 0 <= faults < m:

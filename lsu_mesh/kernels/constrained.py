@@ -3,8 +3,8 @@
 The arrays of a set are exact numbers: what is written in them *is* the set. Rounding is made while a new set is
 computed, and goes into two places. Errors of the centre and the generators go into a box that
 :func:`~lsu_mesh.kernels.zonotope.absorb_box` adds. Errors of a constraint row go into a slack: if the exact row says
-``a'ξ = β`` and the computed one differs by at most ``Σ_j |δ_j| + |δβ| ≤ ε`` for every ``|ξ|∞ ≤ 1``, then the computed row
-holds with one more term ``ε s``, ``|s| ≤ 1``. A generator that appears in this row only and nowhere in the state (a
+``a'ξ = β`` and the computed one differs by at most ``Σ_j |δ_j| + |δβ| ≤ ε`` for every ``|ξ|∞ ≤ 1``, then the computed
+row holds with one more term ``ε s``, ``|s| ≤ 1``. A generator that appears in this row only and nowhere in the state (a
 strip's own one) takes the slack by growing, ``|A_ij| + ε`` rounded up, so that no column is added.
 """
 
@@ -24,10 +24,10 @@ Array = NDArray[np.float64]
 def meet_strips(
     c: Array, G: Array, A: Array, b: Array, P: Array, middle: Array, radius: Array
 ) -> tuple[Array, Array, Array]:
-    """Generalised intersection with the strips ``|P_i x − middle_i| ≤ radius_i`` (Scott et al. 2016, eq. 13; P2023 (15)).
+    """Generalised intersection with strips ``|P_i x − middle_i| ≤ radius_i`` (Scott et al. 2016 (13); P2023 (15)).
 
-    One generator and one constraint ``(P_i G) ξ − radius_i η_i = middle_i − P_i c`` per strip whose ``middle`` is a number
-    (NaN: no strip). Returns G (n, g + k), A (m + k, g + k), b (m + k,).
+    One generator and one constraint ``(P_i G) ξ − radius_i η_i = middle_i − P_i c`` per strip whose ``middle`` is a
+    number (NaN: no strip). Returns G (n, g + k), A (m + k, g + k), b (m + k,).
     """
     n, g = G.shape
     m = A.shape[0]

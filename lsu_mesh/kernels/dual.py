@@ -4,7 +4,7 @@ For *any* vector y, feasible ξ and objective d, ``d'ξ = y'b + (d − A'y)'ξ �
 ``A ξ = b`` and ``|ξ_j| ≤ 1``. A solver is needed only to find a good y, never to be believed. With d = 0 a bound below
 zero is impossible for a feasible ξ: it proves that the set is empty (Farkas).
 
-Source: Neumaier, Shcherbina, *Safe bounds in linear and mixed-integer linear programming*, 2004, for the box ``|ξ| ≤ 1``.
+Source: Neumaier, Shcherbina, *Safe bounds in linear and mixed-integer linear programming*, 2004.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ def dual_bound(d: Array, A: Array, b: Array, row_sums: Array, y: Array) -> float
 
     d (g,), A (m, g), b (m,); ``row_sums`` from :func:`absolute_row_sums`. A y that is not finite counts as 0.
 
-    Rounding. Each ``t_j = d_j − Σ_i A_ij y_i`` is off by at most ``γ_{m+1} (|d_j| + Σ_i |A_ij y_i|)``; summed over j that
-    is ``γ_{m+1} (Σ|d_j| + Σ_i |y_i| row_sums_i)``. ``Σ b_i y_i`` is off by ``γ_m Σ|b_i y_i|`` and the final sum of g + 1
-    terms by ``γ_{g+1}`` times the sum of their moduli. The three are added with a few operations to spare.
+    Rounding. Each ``t_j = d_j − Σ_i A_ij y_i`` is off by at most ``γ_{m+1} (|d_j| + Σ_i |A_ij y_i|)``; summed over j
+    that is ``γ_{m+1} (Σ|d_j| + Σ_i |y_i| row_sums_i)``. ``Σ b_i y_i`` is off by ``γ_m Σ|b_i y_i|`` and the final sum of
+    g + 1 terms by ``γ_{g+1}`` times the sum of their moduli. The three are added with a few operations to spare.
     """
     m, g = A.shape
     for i in range(m):

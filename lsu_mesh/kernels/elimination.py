@@ -65,8 +65,8 @@ def overruns(n: int, L: Array, middle: Array, row_of: NDArray[np.int64], beyond:
 def movability(n: int, L: Array) -> Array:
     """``P_jj`` (g,): the square of the largest ξ_j among the moves d with ``A d = 0`` and ``|d|² + |G d|² = 1``.
 
-    P is the top left block of the projector onto the null space of ``M = [A 0; G −I]``: ``P_jj = 1 − a_j'(M M')⁻¹ a_j`` with
-    ``a_j = (A_j, G_j)``. Rows of G are divided by their scale. Directions of M that depend on others are left out.
+    P is the top left block of the projector onto the null space of ``M = [A 0; G −I]``: ``P_jj = 1 − a_j'(M M')⁻¹ a_j``
+    with ``a_j = (A_j, G_j)``. Rows of G are divided by their scale. Directions of M that depend on others are left out.
     """
     N, g = L.shape
     scale = row_scales(L)
@@ -112,8 +112,8 @@ def movability(n: int, L: Array) -> Array:
 def eliminate(L: Array, middle: Array, slack: Array, i: int, j: int) -> None:
     """Clear column j in every row but the constraint i, by adding multiples of row i; slack takes the rounding.
 
-    With ``f = fl(L_sj / L_ij)`` the exact new entry is ``L_sk − f L_ik`` (any f is admitted); two roundings cost at most
-    ``u (|L_sk| + 2 |f L_ik|)`` to first order. The entry in column j is set to 0, which is off by ``u |L_sj|``.
+    With ``f = fl(L_sj / L_ij)`` the exact new entry is ``L_sk − f L_ik`` (any f is admitted); two roundings cost at
+    most ``u (|L_sk| + 2 |f L_ik|)`` to first order. The entry in column j is set to 0, which is off by ``u |L_sj|``.
     """
     N, g = L.shape
     pivot = L[i, j]

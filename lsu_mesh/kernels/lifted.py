@@ -4,8 +4,8 @@ Rows 0 … n−1 are the state, rows n … n+m−1 the constraints (P2023 (14)):
 
     ``[x; 0] = middle + L ξ + s``,  ``L = [G; A]``,  ``middle = [c; −b]``,  ``|ξ|∞ ≤ 1``,  ``|s| ≤ slack``.
 
-Every change made here is exact for some s within the slack: what floating point loses is added to ``slack`` (n + m,), rounded up.
-A multiple of a constraint row may be added to any row, since that row is zero at every point of the set.
+Every change made here is exact for some s within the slack: what floating point loses is added to ``slack`` (n + m,),
+rounded up. A multiple of a constraint row may be added to any row, since that row is zero at every point of the set.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ def reduce_columns(L: Array, slack: Array, limit: int) -> Array:
     """Columns (N, ≤ limit) that generate a zonotope which contains ``L ξ ⊕ box(slack)``; limit ≥ N.
 
     N columns D are chosen as a basis by greedy elimination. A further column ``v = D t`` is swallowed by lengthening
-    ``D_i`` by ``|t_i|``, those with the least ``Π(1 + |t_i|) − 1 − Σ|t_i|`` first (Scott et al. 2016, §4.3). What ``v − D t``
-    leaves goes to the slack, and the slack is swallowed last by :func:`swallow_box`, which proves that it may.
+    ``D_i`` by ``|t_i|``, those with the least ``Π(1 + |t_i|) − 1 − Σ|t_i|`` first (Scott et al. 2016, §4.3). What ``v −
+    D t`` leaves goes to the slack, and the slack is swallowed last by :func:`swallow_box`, which proves that it may.
     Where it cannot, the smallest columns are boxed instead.
     """
     N, g = L.shape
@@ -190,12 +190,12 @@ def _swallow(D: Array, L: Array, j: int, T: Array, length: Array, slack: Array) 
 
 @kernel
 def swallow_box(columns: Array, M: Array, slack: Array) -> bool:
-    """Lengthen the first N columns C in place until they generate ``C ξ ⊕ box(slack)``; ``False`` where that is not proved.
+    """Lengthen the first N columns C in place until they generate ``C ξ ⊕ box(slack)``; ``False`` without a proof.
 
-    M ≈ C⁻¹, (N, N). With ``s ≥ slack + |I − C M| s`` the series for the inverse gives ``|C⁻¹| slack ≤ |M| s =: τ``.
-    The lengthened columns are rounded, ``C' = C diag(1 + τ) + Δ`` with ``|Δ| ≤ u |C'|``; ``C' box(1)`` holds ``C box(1 + q)``
-    as soon as ``q + |C⁻¹||Δ| 1 ≤ τ``. So ``8 u`` times the row sums of |C| enter the slack beforehand (C itself was rounded
-    once, C' is at most 1.5 times as long, and both are doubled), and ``τ ≤ ½`` is checked.
+    M ≈ C⁻¹, (N, N). With ``s ≥ slack + |I − C M| s`` the series for the inverse gives ``|C⁻¹| slack ≤ |M| s =: τ``. The
+    lengthened columns are rounded, ``C' = C diag(1 + τ) + Δ`` with ``|Δ| ≤ u |C'|``; ``C' box(1)`` holds ``C box(1 +
+    q)`` as soon as ``q + |C⁻¹||Δ| 1 ≤ τ``. So ``8 u`` times the row sums of |C| enter the slack beforehand (C itself
+    was rounded once, C' is at most 1.5 times as long, and both are doubled), and ``τ ≤ ½`` is checked.
     """
     N = columns.shape[0]
     given = np.empty(N)

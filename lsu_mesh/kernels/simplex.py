@@ -1,12 +1,12 @@
 """A simplex method for small programs ``max d'ξ`` over ``{ξ : A ξ = b, |ξ|∞ ≤ 1}`` that share one feasible set.
 
-It keeps the full tableau ``T = B⁻¹ [A | I]``: the dimensions are small, a pivot is one rank-one update of contiguous rows,
-and the right part is the inverse of the basis, from which multipliers are read. It starts from a canonical basis
+It keeps the full tableau ``T = B⁻¹ [A | I]``: the dimensions are small, a pivot is one rank-one update of contiguous
+rows, and the right part is the inverse of the basis, from which multipliers are read. It starts from a canonical basis
 (Gauss–Jordan with full pivoting), finds a feasible vertex once, and goes on from the last vertex for every further
 objective. Nothing found here is believed: bounds come from :func:`~lsu_mesh.kernels.dual.dual_bound`.
 
-Rows: basic variable ``basis[i]`` has the value ``level[i]``; −1 marks a row that depends on the others. A nonbasic variable
-sits at the bound ``at[j] = ±1``.
+Rows: basic variable ``basis[i]`` has the value ``level[i]``; −1 marks a row that depends on the others. A nonbasic
+variable sits at the bound ``at[j] = ±1``.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ def blocking_row(
 
 @kernel
 def _step_to_bound(slope: float, level: float, phase_one: bool) -> tuple[float, float]:
-    """How far the entering variable may go before a basic variable that falls with ``slope`` stops it; pivot 0: never."""
+    """How far the entering variable may go until a basic one, falling with ``slope``, stops it; pivot 0: never."""
     if abs(slope) <= PIVOT:
         return 2.0, 0.0
     value = level if slope > 0.0 else -level
@@ -250,7 +250,7 @@ def find_vertex(T: Array, basis: Indices, at: Array, level: Array, sigma: Array)
 
 @kernel
 def climb(T: Array, basis: Indices, at: Array, level: Array, d: Array, y: Array) -> bool:
-    """Phase two: from a feasible vertex to one that maximises d; the multipliers go to y (m,). ``False`` at the limit."""
+    """Phase two: from a feasible vertex to one that maximises d; multipliers to y (m,). ``False`` at the limit."""
     m = T.shape[0]
     g = at.size
     largest = 0.0

@@ -19,8 +19,9 @@ def predict_constrained(
 ) -> tuple[bool, Body, Array, Array]:
     """Time update ``R X ⊕ B u ⊕ N box(widths)``; R (n, n), B (n, p), u (p,), N (n, q), widths (q,).
 
-    The set gets a generator per noise of positive width; those along the axes take the rounding of centre and generators,
-    else generators are added for it. The box is carried by interval arithmetic. ``False`` where numbers overflow.
+    The set gets a generator per noise of positive width; those along the axes take the rounding of centre and
+    generators, else generators are added for it. The box is carried by interval arithmetic. ``False`` where numbers
+    overflow.
     """
     c, G, A, b = body
     n, g = G.shape

@@ -1,8 +1,8 @@
 """Arithmetic of zonotopes ``{c + G ξ : |ξ|∞ ≤ 1}`` on plain arrays, rounded outward.
 
-A map or a sum computed in floating point moves the centre and the generators by a little. Each kernel returns, beside the
-result, ``slack`` (n,): a box whose Minkowski sum with the computed set contains the exact one.
-:func:`absorb_box` then makes that box part of the set.
+A map or a sum computed in floating point moves the centre and the generators by a little. Each kernel returns, beside
+the result, ``slack`` (n,): a box whose Minkowski sum with the computed set contains the exact one. :func:`absorb_box`
+then makes that box part of the set.
 """
 
 from __future__ import annotations
@@ -125,8 +125,8 @@ def absorb_box(G: Array, A: Array, slack: Array) -> tuple[Array, Array]:
     """Generators (n, g′) and constraint columns (m, g′) of the set ``⊕ box(slack)``.
 
     A coordinate with slack is added to a generator that is parallel to its axis and takes part in no constraint: its
-    value ranges over [−|G_ij|, |G_ij|] whatever the others are, so ``|G_ij| + slack_i``, rounded up, holds the sum. Where
-    there is none a generator is appended.
+    value ranges over [−|G_ij|, |G_ij|] whatever the others are, so ``|G_ij| + slack_i``, rounded up, holds the sum.
+    Where there is none a generator is appended.
     """
     n, g = G.shape
     m = A.shape[0]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -9,6 +12,8 @@ from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.kernels.constrained import meet_sets, meet_strips
 from lsu_mesh.kernels.zonotope import absorb_box, add_centers, zonotope_map, zonotope_radius
 from lsu_mesh.supports.arrays import finite_array, frozen, map_arguments
+from lsu_mesh.supports.exact import Membership
+from lsu_mesh.supports.exact_program import exact_solution
 from lsu_mesh.supports.linear_programs import is_proved_empty, safe_maxima
 from lsu_mesh.supports.polytope import Polytope, enumerate_polytope
 from lsu_mesh.supports.support import Matrix, Support, Vector
@@ -126,24 +131,33 @@ class ConstrainedZonotope(Support):
     def contains(self, x: ArrayLike) -> bool:
         """``False`` only where a separating direction is proved by a Farkas ray of ``G ξ = x − c, A ξ = b``."""
         point = np.array(finite_array("x", x, (self.dim,)))
-        _, rows, sides = meet_sets(
-            self._center,
-            self._generators,
-            self._A,
-            self._b,
-            point,
-            np.zeros((self.dim, 0)),
-            np.zeros((0, 0)),
-            np.zeros(0),
-        )
+        rows, sides = self._system(point)
         return not is_proved_empty(rows, sides)
+
+    def membership(self, x: Sequence[float | Fraction]) -> Membership:
+        """``INSIDE`` or ``OUTSIDE``, proved in exact rational arithmetic; x (n,) may hold fractions. Milliseconds."""
+        exact = [Fraction(entry) for entry in x]
+        rows, sides = self._system(np.array([float(entry) for entry in exact]))
+        g = self.generator_count
+        near = safe_maxima(np.zeros((1, rows.shape[1])), rows, sides).points[0, :g]
+        A = [[Fraction(a) for a in row] for row in (*self._generators.tolist(), *self._A.tolist())]
+        b = [entry - Fraction(c) for entry, c in zip(exact, self._center.tolist(), strict=True)]
+        b += [Fraction(side) for side in self._b.tolist()]
+        found = exact_solution(A, b, near.tolist())
+        return Membership.OUTSIDE if found is None else Membership.INSIDE
+
+    def _system(self, point: Vector) -> tuple[Matrix, Vector]:
+        """Rows and sides of ``A ξ = b``, ``G ξ = x − c``, with slack for the rounded difference."""
+        n = self.dim
+        _, rows, sides = meet_sets(*self.arrays, point, np.zeros((n, 0)), np.zeros((0, 0)), np.zeros(0))
+        return rows, sides
 
     def is_empty(self) -> bool:
         """``True`` only with a verified Farkas ray of ``A ξ = b, |ξ|∞ ≤ 1``."""
         return is_proved_empty(self._A, self._b)
 
     def volume(self) -> float:
-        """Volume of the exact polytope up to dimension 6, of the interval hull (an upper bound) above; 0 when empty or flat."""
+        """Volume of the exact polytope up to dimension 6, above it of the interval hull; 0 when empty or flat."""
         if self.dim > LARGEST_EXACT_VOLUME:
             return 0.0 if self.is_empty() else float(np.prod(np.subtract(*self.bounds()[::-1])))
         return self._polytope().volume
@@ -224,7 +238,8 @@ class ConstrainedZonotope(Support):
         return self
 
     def __repr__(self) -> str:
-        return f"ConstrainedZonotope(dim={self.dim}, generators={self.generator_count}, constraints={self.constraint_count})"
+        size = f"generators={self.generator_count}, constraints={self.constraint_count}"
+        return f"ConstrainedZonotope(dim={self.dim}, {size})"
 
 
 def _two_dimensional(value: ArrayLike, rows: int | None, columns: int | None = None) -> ArrayLike:

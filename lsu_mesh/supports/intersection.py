@@ -63,11 +63,11 @@ class Intersection(Support):
         return 0.5 * lower + 0.5 * upper
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Hull of the joint constrained zonotope met with every part's bounds; ``InconsistentData`` on a set proved empty."""
+        """Hull of the joint set met with every part's bounds; ``InconsistentData`` where it is proved empty."""
         return self._bounds
 
     def volume(self) -> float:
-        """Volume of the exact polytope up to dimension 6, of the interval hull (an upper bound) above; 0 when empty or flat."""
+        """Volume of the exact polytope up to dimension 6, above it of the interval hull; 0 when empty or flat."""
         return self._joint.volume()
 
     def contains(self, x: ArrayLike) -> bool:

@@ -31,7 +31,7 @@ class Limits(NamedTuple):
 
 
 class Settled(NamedTuple):
-    """A set within limits and the box [lower, upper] of the set *before* its reduction; ``empty`` where that is proved."""
+    """A set within limits and the box [lower, upper] of the set *before* its reduction; ``empty`` only if proved."""
 
     body: Body
     lower: Vector

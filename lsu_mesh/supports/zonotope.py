@@ -73,7 +73,7 @@ class Zonotope(Support):
         return frozen(lower), frozen(upper)
 
     def volume(self) -> float:
-        """``2ⁿ Σ |det G_S|`` over the n-subsets of columns; above 500 000 subsets the volume of the interval hull, which bounds it."""
+        """``2ⁿ Σ |det G_S|`` over the n-subsets of columns; above 500 000 of them the volume of the interval hull."""
         if math.comb(self._generators.shape[1], self.dim) > LARGEST_SUM:
             lower, upper = self.bounds()
             return float(np.prod(upper - lower))

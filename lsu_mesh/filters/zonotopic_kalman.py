@@ -1,0 +1,261 @@
+"""The zonotopic Kalman filter: the gain of the Kalman filter, on sets."""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
+from lsu_mesh.filters.arguments import (
+    checked_prior,
+    half_width_vector,
+    input_interval,
+    kernel_model,
+    output_vector,
+    same_states,
+)
+from lsu_mesh.filters.contradiction import strip_contradiction
+from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.gain import hull_gain
+from lsu_mesh.kernels.constrained import meet_strips
+from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
+from lsu_mesh.kernels.zonotope import absorb_box
+from lsu_mesh.kernels.zonotopic_kalman import box_shortest, corrected, kalman_gain
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.linear_programs import is_proved_empty
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.support import Support
+from lsu_mesh.supports.zonotope import Zonotope
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+class Strips(NamedTuple):
+    """``|y − C x| ≤ r``: C (k, n), y (k,), r (k,)."""
+
+    C: Matrix
+    y: Vector
+    r: Vector
+
+
+class Held(NamedTuple):
+    """What the filter knows: the state lies in ``c + H ξ`` and in [lower, upper]; ``pending`` data are not used yet."""
+
+    c: Vector
+    H: Matrix
+    lower: Vector
+    upper: Vector
+    pending: Strips
+
+
+class ZonotopicKalman(Filter):
+    """``c ← c + K (y − C c)``, ``H ← [(I − K C) H, K diag(r)]``; then ``A c + B u``, ``[A H, N diag(rho)]``.
+
+    Parameters
+    ----------
+    model, prior:
+        LSU model with n states; a set, or a pair (lower, upper), that holds x_1.
+    order:
+        Columns of H that are kept in all at each time update, at least n: the longest, and a box of the others;
+        ``None``: all.
+    form:
+        ``"filter"``: the support after :meth:`update` has used y_k. ``"predictor"``: it is that of the one-step
+        prediction from y_{k−1}; y_k is used by the next :meth:`predict` (Combastel's original form, and what P2018
+        compares).
+
+    Raises
+    ------
+    ModelError
+        Names the option or the prior that is wrong.
+
+    ``K = P C'(C P C' + R)⁻¹``, ``P = H H'``, ``R = diag(r²)``, minimises the sum of squares of the generators
+    (Combastel 2015). The set is guaranteed for any K.
+    """
+
+    kind: ClassVar[str] = "ZonotopicKalman"
+    _held: Held
+
+    def __init__(
+        self,
+        model: LSUModel,
+        prior: Support | tuple[ArrayLike, ArrayLike],
+        order: int | None = 15,
+        form: str = "filter",
+    ) -> None:
+        if form not in ("filter", "predictor"):
+            raise ModelError(f'form must be "filter" or "predictor", it is {form!r}')
+        if order is not None and order < model.state_count:
+            raise ModelError(f"order must be at least {model.state_count}, the number of states, it is {order}")
+        self._model = model
+        self._arrays = kernel_model(model)
+        self._order = order
+        self._form = form
+        self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
+
+    @property
+    def model(self) -> LSUModel:
+        """The model in force when no step says otherwise."""
+        return self._model
+
+    @property
+    def support(self) -> Zonotope:
+        """The zonotope that holds the state."""
+        return Zonotope(self._held.c, self._held.H)
+
+    @property
+    def point(self) -> Vector:
+        """Centre of the zonotope (n,), moved into the bounds."""
+        return np.clip(self._held.c, *self.bounds())
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Interval hull of the zonotope, met with what the domain or a transferred box says; (n,), (n,)."""
+        lower, upper = self.support.bounds()
+        return np.maximum(lower, self._held.lower), np.minimum(upper, self._held.upper)
+
+    def predict_output(self) -> OutputPrediction:
+        """``C c ± (Σ_j |C H_j| + r)``, met with the image of :meth:`bounds`."""
+        low, high = self._noiseless_output()
+        r = self._arrays.r
+        return OutputPrediction(
+            np.where(r > 0, np.nextafter(low - r, -np.inf), low),
+            np.where(r > 0, np.nextafter(high + r, np.inf), high),
+            self._model.C @ self.point,
+        )
+
+    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Zonotope:
+        """Data update with the optimal gain; in the predictor form the data wait for :meth:`predict`."""
+        values = output_vector(y, self._model.output_count)
+        widths = half_width_vector("r", r, self._arrays.r)
+        known = ~np.isnan(values)
+        if known.any():
+            strips = Strips(np.array(self._arrays.C[known]), values[known], widths[known])
+            if self._excludes(strips):
+                raise strip_contradiction(self._model.outputs, *self._noiseless_output(), values, widths)
+            if self._form == "filter":
+                self._held = _corrected(self._held, strips)
+            else:
+                waiting = self._held.pending
+                self._held = self._held._replace(pending=Strips(*map(_stacked, waiting, strips)))
+        return self.support
+
+    def predict(
+        self,
+        u: ArrayLike | Orthotope | None = None,
+        rho: ArrayLike | None = None,
+        model: LSUModel | None = None,
+    ) -> Zonotope:
+        """Time update ``A X ⊕ B u ⊕ N box(rho)``, reduced; :meth:`bounds` are met with ``model.domain``."""
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else kernel_model(used)
+        center, half_widths = input_interval(u, used.input_count)
+        widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
+        held = _corrected(self._held, self._held.pending)
+        body = (held.c, held.H, np.zeros((0, held.H.shape[1])), np.zeros(0))
+        finite, moved, lower, upper = predict_constrained(
+            body, *self.bounds(), arrays.A, arrays.B, center, arrays.G, widths
+        )
+        if not finite:
+            raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
+        c, H = moved[0], moved[1] if self._order is None else box_shortest(moved[1], self._order)
+        if used.domain is None:
+            lower, upper = _everything(c.size)
+        else:
+            lower, upper = np.maximum(lower, used.domain.lower), np.minimum(upper, used.domain.upper)
+        held = Held(c, H, lower, upper, _no_strips(c.size))
+        if _is_contradictory(held):
+            raise InconsistentData("the prediction is proved to miss the domain")
+        self._held = held
+        return self.support
+
+    def condition(self, support: Support) -> float:
+        """Keep a zonotope that holds ``X ∩ support``, and the box of ``support``; the gain is that of the hulls.
+
+        The faces of the box are offered as strips to the gain; the result is kept where it shrinks the hull, else the
+        set stays as it is and only the bounds are met.
+        """
+        other = checked_prior(self._model, support)
+        before = self.bounds()
+        lower, upper = other.bounds()
+        box = Orthotope(lower, upper)
+        strips = Strips(np.eye(box.dim), np.array(box.center), np.array(box.half_widths))
+        if self._excludes(strips) or self.support.intersect(other).is_empty():
+            raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
+        met = self._held._replace(lower=np.maximum(self._held.lower, lower), upper=np.minimum(self._held.upper, upper))
+        if _is_contradictory(met):
+            raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
+        shrunk = _corrected(met._replace(pending=_no_strips(box.dim)), strips)._replace(pending=met.pending)
+        if self._order is not None:
+            shrunk = shrunk._replace(H=box_shortest(shrunk.H, self._order))
+        self._held = shrunk if _size(shrunk) < _size(met) else met
+        return hull_gain(before, self.bounds())
+
+    def reset(self, support: Support) -> None:
+        """Start again from a set that is known to hold the state now: from its zonotope, else from its box."""
+        given = checked_prior(self._model, support)
+        body = given.to_constrained_zonotope()
+        if body.constraint_count:
+            body = given.interval_hull().to_constrained_zonotope()
+        c, H, _, _ = body.arrays
+        H = H if self._order is None else box_shortest(H, self._order)
+        self._held = Held(c, H, *given.bounds(), _no_strips(c.size))
+
+    def snapshot(self) -> Held:
+        """Zonotope, box and waiting data; none is ever written again."""
+        return self._held
+
+    def restore(self, snapshot: object) -> None:
+        """Return to a state taken by :meth:`snapshot`, bit by bit."""
+        if not isinstance(snapshot, Held):
+            raise ModelError(f"the snapshot must be one of ZonotopicKalman, it is {type(snapshot).__name__}")
+        self._held = snapshot
+
+    def _noiseless_output(self) -> tuple[Vector, Vector]:
+        C = self._arrays.C
+        box_low, box_high = image_of_box(C, *self.bounds())
+        high = np.array([self.support.support(row) for row in C])
+        low = np.array([-self.support.support(-row) for row in C])
+        return np.maximum(low, box_low), np.minimum(high, box_high)
+
+    def _excludes(self, strips: Strips) -> bool:
+        """Whether the strips are proved to miss the zonotope."""
+        held = self._held
+        none = np.zeros((0, held.H.shape[1]))
+        _, A, b = meet_strips(held.c, held.H, none, np.zeros(0), *strips)
+        return is_proved_empty(A, b)
+
+
+def _corrected(held: Held, strips: Strips) -> Held:
+    """The data update; the box stays, and no data wait any more."""
+    if strips.y.size == 0:
+        return held
+    K = kalman_gain(held.H, strips.C, strips.r)
+    c, H, slack = corrected(held.c, held.H, strips.C, strips.y, strips.r, K)
+    H, _ = absorb_box(H, np.zeros((0, H.shape[1])), slack)
+    return held._replace(c=c, H=H, pending=_no_strips(c.size))
+
+
+def _is_contradictory(held: Held) -> bool:
+    lower, upper = Zonotope(held.c, held.H).bounds()
+    return bool((np.maximum(lower, held.lower) > np.minimum(upper, held.upper)).any())
+
+
+def _size(held: Held) -> float:
+    """Sum of the half-widths of the hull relative to the box, a scale-free measure of what a correction has gained."""
+    lower, upper = Zonotope(held.c, held.H).bounds()
+    widths = np.where(held.upper > held.lower, held.upper - held.lower, 1.0)
+    return float(((upper - lower) / widths).sum())
+
+
+def _no_strips(n: int) -> Strips:
+    return Strips(np.zeros((0, n)), np.zeros(0), np.zeros(0))
+
+
+def _everything(n: int) -> tuple[Vector, Vector]:
+    return np.full(n, -np.inf), np.full(n, np.inf)
+
+
+def _stacked(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([one, other])
