@@ -48,7 +48,7 @@ EMPTY = Body(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 2, 3)))
 
 
 def project(message: SupportMessage, axes: tuple[int, ...]) -> Support:
-    """The exact projection of a set onto the coordinates ``axes`` (1 to 3 of them): rows are picked, nothing is rounded."""
+    """The exact projection of a set onto 1 to 3 coordinates ``axes``: rows are picked, nothing is rounded."""
     rows = list(axes)
     support = to_support(message)
     if isinstance(message, OrthotopeMessage):
@@ -111,12 +111,8 @@ def _polyhedron(points: Array, local: Array) -> Body | None:
     if hull is None:
         return None
     corners = local[hull.simplices]
-    flipped = (
-        np.einsum(
-            "ij,ij->i", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), hull.equations[:, :3]
-        )
-        < 0
-    )
+    winding = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flipped = np.einsum("ij,ij->i", winding, hull.equations[:, :3]) < 0
     simplices = hull.simplices.copy()
     simplices[flipped] = simplices[flipped][:, ::-1]
     triangles = points[simplices]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import rerun as rr
@@ -18,6 +18,7 @@ REMEMBERED = 4096
 """Steps for which a truth waits for sets and sets wait for the truth."""
 
 Array = NDArray[np.float64]
+Kept = TypeVar("Kept")
 
 
 class _Row(NamedTuple):
@@ -156,7 +157,7 @@ def _series(rows: list[_Row]) -> Array:
     return np.array([(row.lower, row.point, row.upper) for row in rows])
 
 
-def _remember(memory: dict[int, list[object]] | dict[int, list[float]] | dict, step: int, value: object) -> None:  # type: ignore[type-arg]
+def _remember(memory: dict[int, Kept], step: int, value: Kept) -> None:
     memory[step] = value
     while len(memory) > REMEMBERED:
         del memory[next(iter(memory))]

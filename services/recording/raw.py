@@ -1,7 +1,7 @@
 """Raw payloads, lossless: every message as it came, the source of truth of a recording.
 
-One entity per topic and name, ``/raw/<topic>/<name>``, and ``/raw/refused`` for payloads that are no message of this mesh.
-A row holds ``payload`` (bytes), ``key``, ``arrival_ns`` and ``number`` (order of arrival at the recorder).
+One entity per topic and name, ``/raw/<topic>/<name>``, and ``/raw/refused`` for payloads that are no message of this
+mesh. A row holds ``payload`` (bytes), ``key``, ``arrival_ns`` and ``number`` (order of arrival at the recorder).
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 from rerun.chunk import RrdReader
@@ -47,5 +47,5 @@ def _rows(batch: pa.RecordBatch) -> list[tuple[int, RawMessage]]:
     ]
 
 
-def _flat(column: pa.Array) -> list[object]:
-    return column.flatten().to_pylist()
+def _flat(column: pa.Array) -> list[Any]:
+    return list(column.flatten().to_pylist())

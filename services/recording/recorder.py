@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -45,7 +44,7 @@ class Recorder:
     OSError
         The file exists already or cannot be written.
 
-    After that nothing is raised: what cannot be drawn is counted in :attr:`problems`, and its payload is stored all the same.
+    After that nothing is raised: what cannot be drawn is counted in :attr:`problems`, its payload is stored all the same.
     """
 
     def __init__(

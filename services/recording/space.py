@@ -1,7 +1,8 @@
 """Sets in three coordinates: translucent bodies with edges, the true state among them, seen from a frame that follows.
 
-Bodies are thinned, numbers never are: once per ``1 / recorder.mesh_hz`` a step is chosen by the arrival of its first set,
-and all sets of that step, and its truth, are drawn. Where drawing is dearer than a quarter of the time, it is done less often.
+Bodies are thinned, numbers never are: once per ``1 / recorder.mesh_hz`` a step is chosen by the arrival of its first
+set, and all sets of that step, and its truth, are drawn. Where drawing takes more than a quarter of the time, it is
+done less often.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from lsu_mesh.mesh.messages import Fused, Posterior, SupportMessage, Truth
+from lsu_mesh.mesh.messages import Posterior, SupportMessage, Truth
 from services.recording import frame
 from services.recording.body import Body, body, project, rectangle
 from services.recording.names import Names, path

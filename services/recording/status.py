@@ -1,4 +1,4 @@
-"""Lanes of status: what each posterior is, how each process does, what the fusion does with each source. On change only."""
+"""Lanes of status, on change only: of the sets, of the processes, and of the sources in the eyes of the fusion."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import platform
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import rerun as rr
 
@@ -41,8 +42,8 @@ def open_stream(
         sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=serve_port, server_memory_limit="256MB"))
     stream.set_sinks(*sinks, default_blueprint=blueprint(names))
     stream.send_recording_name(f"{names.configuration.mesh.name} {path.stem}")
-    properties = rr.AnyValues(**(run_description(names.configuration) | dict(run_properties)))
-    stream.send_property("lsu_mesh", properties)
+    properties: dict[str, Any] = run_description(names.configuration) | dict(run_properties)
+    stream.send_property("lsu_mesh", rr.AnyValues(**properties))
     return stream
 
 
