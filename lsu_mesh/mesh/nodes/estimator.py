@@ -312,8 +312,6 @@ class Estimator(Node):
             else:
                 self._waiting = f"input of step {k}" if self._newest > k else ""
                 return False
-        elif self._newest <= k:
-            return False
         self._waiting = ""
         self.engine.predict(u)
         if step.input is not None:

@@ -8,8 +8,8 @@ Three ways (Kuklišová Pavelková, Jirsa, Quinn 2022, and the design of this me
 ``fused``
     The newest fused box of an earlier step, carried forward by the model.
 ``data-predictor``
-    The strip ``ŷ_hi − r ≤ C x ≤ ŷ_lo + r`` from a source's output predictor. Formally optimal, but it can cut off the
-    truth: sets that used it carry ``guarantee = "none"``.
+    The strip ``ŷ_hi − r ≤ C x ≤ ŷ_lo + r`` from a source's predictor of the same output, with the target's r.
+    Formally optimal, but it can cut off the truth: sets that used it carry ``guarantee = "none"``.
 """
 
 from __future__ import annotations
@@ -87,13 +87,15 @@ class Transfer:
         return box.support
 
     def _strip(self, message: Prediction, engine: Filter) -> Support:
-        model = self._configuration.model(self._configuration.filters[message.name].sensors)
-        lower = np.array(message.y_upper) - model.r
-        upper = np.array(message.y_lower) + model.r
-        empty = lower > upper
-        if empty.any():
-            row = int(np.flatnonzero(empty)[0])
-            raise InconsistentData(f"the output predictor of {message.name} is wider than 2 r", rows=(row,))
-        return engine.support.to_constrained_zonotope().meet_strips(
-            model.C, 0.5 * (lower + upper), 0.5 * (upper - lower)
-        )
+        """Strips of the outputs that source and target both have (equal rows of C), with the target's r."""
+        target = engine.model
+        source = self._configuration.model(self._configuration.filters[message.name].sensors)
+        middle, radius = np.full(target.output_count, np.nan), np.zeros(target.output_count)
+        for i in range(target.output_count):
+            for j in range(source.output_count):
+                low, high = message.y_upper[j] - target.r[i], message.y_lower[j] + target.r[i]
+                if np.array_equal(target.C[i], source.C[j]) and low <= high:
+                    middle[i], radius[i] = 0.5 * (low + high), 0.5 * (high - low)
+        if np.isnan(middle).all():
+            raise InconsistentData(f"the output predictor of {message.name} is wider than 2 r, or of other outputs")
+        return engine.support.to_constrained_zonotope().meet_strips(target.C, middle, radius)
