@@ -5,16 +5,19 @@ Views are built in functions, because a view object that is used twice makes the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import rerun.blueprint as rrb
 
 from services.recording import frame
+from services.recording.bands import outline
 from services.recording.names import Names, Output, path
-from services.recording.timeline import STEP
+from services.recording.timeline import SIM_TIME, STEP
 
 OVERVIEW_STATES = 6
 """States that the overview shows; all of them have their own tab where there are more."""
+WINDOW = 100
+"""Steps that plots of bands show."""
 Part = rrb.View | rrb.Container
 
 
@@ -26,7 +29,7 @@ def blueprint(names: Names) -> rrb.Blueprint:
         tabs.append(_grid("States", [_bands(names, i) for i in range(len(names.states))]))
     tabs += [_filter(names, name, settings.kind) for name, settings in configuration.filters.items()]
     tabs += [_fusion(names, name) for name in configuration.fusion]
-    tabs += [_grid("Outputs", [_output(output) for output in names.outputs]), _mesh(), _events()]
+    tabs += [_grid("Outputs", [_output(names, output) for output in names.outputs]), _mesh(), _events()]
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
@@ -42,8 +45,9 @@ def _overview(names: Names) -> Part:
     if len(shown) > OVERVIEW_STATES:
         shown = list(dict.fromkeys([*names.axes(), *shown]))[:OVERVIEW_STATES]
     plots = [_bands(names, i) for i in shown]
-    left = rrb.Vertical(_space(names, frame.ALL, ["/space/sets/**"]), _status(), row_shares=[4, 1])
-    right = [*plots, _plot("Log-volume of the sets", ["/log_volume/**"])]
+    share = min(0.05 + 0.04 * len(names.estimators), 0.4)
+    left = rrb.Vertical(_space(names, frame.ALL, ["/space/sets/**"]), _status(), row_shares=[1.0 - share, share])
+    right = [*plots, _whole("Log-volume of the sets", ["/log_volume/**"])]
     columns = 1 if len(right) <= 4 else 2
     return rrb.Horizontal(left, rrb.Grid(*right, grid_columns=columns), column_shares=[2, 3], name="Overview")
 
@@ -51,7 +55,7 @@ def _overview(names: Names) -> Part:
 def _filter(names: Names, name: str, kind: str) -> Part:
     left = rrb.Vertical(
         _space(names, name, [f"{path('space', 'sets', name)}/**"]),
-        _plot("Widths", [path("widths", name)]),
+        _plot(names, "Widths", [path("widths", name)]),
         row_shares=[3, 1],
     )
     return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=f"{name} ({kind})")
@@ -61,7 +65,7 @@ def _fusion(names: Names, name: str) -> Part:
     several = len(names.configuration.fusion) > 1
     left = rrb.Vertical(
         _space(names, name, ["/space/sets/**"]),
-        _plot("Log-volume of the sets", ["/log_volume/**"]),
+        _whole("Log-volume of the sets", ["/log_volume/**"]),
         rrb.StateTimelineView(name="Sources", origin="/", contents=[f"{path('trust', name)}/**"]),
         row_shares=[4, 2, 1.2],
     )
@@ -81,7 +85,7 @@ def _states_of(names: Names, peer: str) -> Part:
 
 def _mesh() -> Part:
     health = rrb.StateTimelineView(name="Processes", origin="/", contents=["/health/**"])
-    latency = _plot("Age of the oldest measurement at arrival [ms]", ["/latency/**"])
+    latency = _whole("Age of the oldest measurement at arrival [ms]", ["/latency/**"])
     topology = rrb.GraphView(name="Who sends to whom", origin="/topology")
     left = rrb.Vertical(topology, latency, row_shares=[3, 2])
     right = rrb.Vertical(_status(), health, row_shares=[1, 2])
@@ -100,37 +104,71 @@ def _grid(name: str, views: Sequence[Part]) -> Part:
 def _bands(names: Names, state: int, peer: str | None = None) -> Part:
     part = names.states[state]
     shown = f"{path('bands', part)}/**" if peer is None else path("bands", part, peer)
-    return _plot(names.label(state), [shown, path("truth", part)])
+    title = names.label(state) if peer else f"{names.label(state)}: truth (pink), bounds of all peers"
+    crowded = {} if peer else {path("bands", part, name): outline() for name in _outlined(names)}
+    return _plot(names, title, [shown, path("truth", part)], legend=peer is not None and state == 0, overrides=crowded)
+
+
+def _outlined(names: Names) -> list[str]:
+    """Peers whose bands are outlines where all are shown: the filters, unless they are few and there is no fusion."""
+    filters = list(names.configuration.filters)
+    return filters if names.configuration.fusion or len(filters) > 3 else []
 
 
 def _errors(names: Names, state: int, peer: str) -> Part:
     part = names.states[state]
-    return _plot(f"{names.label(state)} − truth", [path("errors", part, peer)])
+    return _plot(names, f"{names.label(state)} − truth", [path("errors", part, peer)], legend=state == 0)
 
 
-def _output(output: Output) -> Part:
+def _output(names: Names, output: Output) -> Part:
     contents = [output.measured(), f"{path('outputs', output.sensor, output.part)}/**"]
-    return _plot(f"{output.label}: measured, and predicted by the filters", contents)
+    return _plot(names, f"{output.label}: measured (grey), and predicted by the filters", contents, legend=False)
 
 
 def _status() -> Part:
     return rrb.StateTimelineView(name="Status of the sets", origin="/", contents=["/status/**"])
 
 
-def _plot(name: str, contents: list[str]) -> Part:
-    link = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
-    return rrb.TimeSeriesView(name=name, origin="/", contents=contents, axis_x=link)
+def _plot(
+    names: Names,
+    name: str,
+    contents: list[str],
+    *,
+    legend: bool = True,
+    overrides: Mapping[str, rrb.Visualizer] | None = None,
+) -> Part:
+    """Series in a window of steps that ends at the cursor; all such plots share their time axis."""
+    seconds = WINDOW * names.configuration.mesh.dt
+    now = rrb.TimeRangeBoundary.cursor_relative()
+    window = [
+        rrb.VisibleTimeRange(STEP, start=rrb.TimeRangeBoundary.cursor_relative(seq=-WINDOW), end=now),
+        rrb.VisibleTimeRange(SIM_TIME, start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds), end=now),
+    ]
+    return rrb.TimeSeriesView(
+        name=name,
+        origin="/",
+        contents=contents,
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        plot_legend=rrb.PlotLegend(visible=legend),
+        time_ranges=window,
+        overrides=dict(overrides) if overrides else None,
+    )
+
+
+def _whole(name: str, contents: list[str]) -> Part:
+    """Series over the whole run."""
+    return rrb.TimeSeriesView(name=name, origin="/", contents=contents)
 
 
 def _space(names: Names, name: str, sets: list[str]) -> Part:
     axes = [names.states[axis] for axis in names.axes()]
     origin = frame.entity(name)
-    title = f"Sets of {', '.join(axes)}"
+    title = f"Truth (pink) in the sets of {', '.join(axes)}"
     if len(axes) < 3:  # from the top
         eye = rrb.EyeControls3D(position=(0.0, 0.0, 3.6), look_target=(0.0, 0.0, 0.0), eye_up=(0.0, 1.0, 0.0))
         grid = rrb.LineGrid3D(visible=False)
     else:
-        eye = rrb.EyeControls3D(position=(2.0, -3.4, 1.9), look_target=(0.0, 0.0, -0.1), eye_up=(0.0, 0.0, 1.0))
+        eye = rrb.EyeControls3D(position=(1.4, -2.45, 1.25), look_target=(0.0, 0.0, -0.1), eye_up=(0.0, 0.0, 1.0))
         grid = rrb.LineGrid3D(visible=False)
     contents = [*sets, "/space/truth", f"{origin}/**"]
     return rrb.Spatial3DView(name=title, origin=origin, contents=contents, eye_controls=eye, line_grid=grid)

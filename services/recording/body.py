@@ -28,7 +28,7 @@ Indices = NDArray[np.int64]
 
 FLAT = 1e-9
 """A spread below this share of the largest counts as none."""
-COPLANAR = 1e-9
+COPLANAR = 1e-6
 """Facets whose unit normals agree to this are one face, without an edge between them."""
 
 _CORNERS = np.array([[(i >> axis) & 1 for axis in range(3)] for i in range(8)]) * 2.0 - 1.0

@@ -10,6 +10,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from lsu_mesh.mesh.messages import Posterior, Truth
+from services.recording.bands import band_columns, band_style, error_columns, error_style, line_style
 from services.recording.names import Names, path
 from services.recording.palette import TRUTH, Color
 from services.recording.timeline import Moment, Timelines
@@ -92,18 +93,13 @@ class Estimates:
         times = self._timelines.columns([moment for moment, _ in rows])
         states = np.array([x for _, x in rows])
         for i, state in enumerate(self._names.states):
-            self._stream.send_columns(path("truth", state), times, rr.Scalars.columns(scalars=states[:, i]))
+            self._stream.send_columns(path("truth", state), times, rr.Measurements.columns(values=states[:, i]))
 
     def _send_rows(self, peer: str, rows: list[_Row]) -> None:
         times = self._timelines.columns([row.moment for row in rows])
         series = _series(rows)
-        half = 0.5 * (series[:, 2] - series[:, 0])
-        middle = series[:, 0] + half
         for i, state in enumerate(self._names.states):
-            columns = [
-                *rr.Scalars.columns(scalars=series[:, :, i]),
-                *rr.Measurements.columns(values=middle[:, i], variances=half[:, i] ** 2),
-            ]
+            columns = band_columns(series[:, 0, i], series[:, 1, i], series[:, 2, i])
             self._stream.send_columns(path("bands", state, peer), times, columns)
         widths = series[:, 2] - series[:, 0]
         self._stream.send_columns(path("widths", peer), times, rr.Scalars.columns(scalars=widths))
@@ -121,32 +117,21 @@ class Estimates:
         times = self._timelines.columns([error.moment for error in errors])
         series = _series([error.row for error in errors]) - np.array([error.truth for error in errors])[:, None, :]
         for i, state in enumerate(self._names.states):
-            columns = rr.Scalars.columns(scalars=series[:, :, i])
+            columns = error_columns(series[:, 0, i], series[:, 1, i], series[:, 2, i])
             self._stream.send_columns(path("errors", state, peer), times, columns)
 
     def _style(self, colors: dict[str, Color]) -> None:
-        for i, state in enumerate(self._names.states):
-            label = self._names.label(i)
-            style = rr.SeriesLines(colors=[TRUTH], widths=[2.0], names=["truth"])
-            self._stream.log(path("truth", state), style, static=True)
+        for state in self._names.states:
+            self._stream.log(path("truth", state), line_style("truth", TRUTH, 2.0), static=True)
             for peer, color in colors.items():
-                self._style_band(path("bands", state, peer), peer, color)
-                self._style_error(path("errors", state, peer), f"{peer} {label}", color)
+                self._stream.log(path("bands", state, peer), band_style(peer, color), static=True)
+                self._stream.log(path("errors", state, peer), error_style(peer, color), static=True)
         labels = [self._names.label(i) for i in range(len(self._names.states))]
         for peer, color in colors.items():
             shades = [_shade(color, i, len(labels)) for i in range(len(labels))]
             self._line(path("widths", peer), shades, [f"{peer} {label}" for label in labels])
             self._line(path("log_volume", peer), [color], [peer])
             self._line(path("latency", peer), [color], [peer])
-
-    def _style_band(self, entity: str, peer: str, color: Color) -> None:
-        lines = rr.SeriesLines(colors=[color] * 3, widths=[1.0, 1.5, 1.0], names=[peer] * 3)
-        band = rr.Measurements.from_fields(colors=[color], widths=[0.0], names=[peer])
-        self._stream.log(entity, lines, band, static=True)
-
-    def _style_error(self, entity: str, label: str, color: Color) -> None:
-        names = [f"{label} lower", f"{label} point", f"{label} upper"]
-        self._stream.log(entity, rr.SeriesLines(colors=[color] * 3, widths=[1.0, 2.0, 1.0], names=names), static=True)
 
     def _line(self, entity: str, colors: list[Color], names: list[str]) -> None:
         self._stream.log(entity, rr.SeriesLines(colors=colors, widths=[1.5] * len(names), names=names), static=True)

@@ -19,6 +19,7 @@ ALL = "all peers"
 """The frame of views that show several peers; no peer can have this name."""
 UNIFORM = 5.0
 """Axes whose scales differ by no more than this factor share one scale, so that angles are true."""
+READABLE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 LARGEST_RATIO = 4.0
 """A set wider than this many times the narrowest does not widen the common frame."""
 
@@ -67,7 +68,7 @@ class Frame:
 
     def _arrows(self, scale: Array) -> list[rr.ComponentColumn]:
         d = len(self._axes)
-        corner = np.array([-1.25] * d + [0.0] * (3 - d))
+        corner = np.array([-1.1] * d + [0.0] * (3 - d))
         labels = [
             f"{label}: {size:g} {unit}".rstrip()
             for label, size, unit in zip(self._labels, scale, self._units, strict=True)
@@ -84,7 +85,7 @@ class Frame:
 
 
 def readable_scale(half_widths: Array) -> Array:
-    """Scale per axis: the next of 1, 2, 5, 10, … above the half-width; one for all where they hardly differ."""
+    """Scale per axis: the next readable number above the half-width; one for all where they hardly differ."""
     largest = float(half_widths.max())
     filled = np.where(half_widths > 0, half_widths, largest if largest > 0 else 1.0)
     scale = np.array([_readable(width) for width in filled])
@@ -93,13 +94,13 @@ def readable_scale(half_widths: Array) -> Array:
 
 def _readable(width: float) -> float:
     decade = 10.0 ** math.floor(math.log10(width))
-    return next((step * decade for step in (1.0, 2.0, 5.0) if width <= step * decade), 10.0 * decade)
+    return next((step * decade for step in READABLE if width <= step * decade), 10.0 * decade)
 
 
 def _fits(half_widths: Array, scale: Array) -> bool:
     shares = half_widths / scale
     thin = shares[(shares > 0) & (shares < 0.05)]
-    return bool(0.3 <= shares.max() <= 1.2 and (thin.size == 0 or scale.max() > UNIFORM * scale.min()))
+    return bool(0.5 <= shares.max() <= 1.1 and (thin.size == 0 or scale.max() > UNIFORM * scale.min()))
 
 
 def _padded(values: Array, filling: float) -> Array:

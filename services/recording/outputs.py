@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 
 from lsu_mesh.mesh.messages import Measurement, Prediction
+from services.recording.bands import band_columns, band_style
 from services.recording.names import Names, Output
 from services.recording.palette import OTHER, Color
 from services.recording.timeline import Moment, Timelines
@@ -54,13 +55,8 @@ class Outputs:
     def _send_predicted(self, peer: str, rows: list[tuple[Moment, Prediction]]) -> None:
         times = self._timelines.columns([moment for moment, _ in rows])
         series = np.array([(message.y_lower, message.y_point, message.y_upper) for _, message in rows])
-        half = 0.5 * (series[:, 2] - series[:, 0])
-        middle = series[:, 0] + half
         for i, output in enumerate(self._names.outputs_of_filter(peer)):
-            columns = [
-                *rr.Scalars.columns(scalars=series[:, :, i]),
-                *rr.Measurements.columns(values=middle[:, i], variances=half[:, i] ** 2),
-            ]
+            columns = band_columns(series[:, 0, i], series[:, 1, i], series[:, 2, i])
             self._stream.send_columns(output.predicted(peer), times, columns)
 
     def _style(self, colors: dict[str, Color]) -> None:
@@ -69,6 +65,5 @@ class Outputs:
             self._stream.log(output.measured(), points, static=True)
         for peer in self._names.configuration.filters:
             for output in self._names.outputs_of_filter(peer):
-                lines = rr.SeriesLines(colors=[colors[peer]] * 3, widths=[1.0, 1.5, 1.0], names=[peer] * 3)
-                band = rr.Measurements.from_fields(colors=[colors[peer]], widths=[0.0], names=[peer])
-                self._stream.log(output.predicted(peer), lines, band, static=True)
+                band = band_style(peer, colors[peer])
+                self._stream.log(output.predicted(peer), band, static=True)

@@ -44,7 +44,8 @@ class Recorder:
     OSError
         The file exists already or cannot be written.
 
-    After that nothing is raised: what cannot be drawn is counted in :attr:`problems`, its payload is stored all the same.
+    After that nothing is raised: what cannot be drawn is counted in :attr:`problems`, and its payload is stored all
+    the same.
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """Sets in three coordinates: translucent bodies with edges, the true state among them, seen from a frame that follows.
 
 Bodies are thinned, numbers never are: once per ``1 / recorder.mesh_hz`` a step is chosen by the arrival of its first
-set, and all sets of that step, and its truth, are drawn. Where drawing takes more than a quarter of the time, it is
+set, and all sets of that step, and its truth, are drawn. Where drawing takes more than its share of the time, it is
 done less often.
 """
 
@@ -24,7 +24,7 @@ from services.recording.timeline import Moment, Timelines
 
 REMEMBERED = 256
 """Chosen steps, and truths, that are kept for sets and truths that come late."""
-SHARE = 0.25
+SHARE = 0.15
 """Largest share of the wall clock that may go into bodies."""
 
 Array = NDArray[np.float64]
@@ -146,10 +146,10 @@ class Space:
         self._stream.send_columns(path("space", "truth"), times, rr.Points3D.columns(positions=places))
 
     def _style(self, colors: dict[str, Color]) -> None:
-        truth = rr.Points3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(5.0))
+        truth = rr.Points3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(6.0))
         self._stream.log(path("space", "truth"), truth, static=True)
         for peer, color in colors.items():
-            mesh = rr.Mesh3D.from_fields(albedo_factor=(*color, 60))
+            mesh = rr.Mesh3D.from_fields(albedo_factor=(*color, 90 if peer in self._fusions else 25))
             self._stream.log(path("space", "sets", peer), mesh, static=True)
-            edges = rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(1.5))
+            edges = rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(1.2))
             self._stream.log(path("space", "sets", peer, "edges"), edges, static=True)

@@ -1,0 +1,175 @@
+"""The real Rerun viewer without a screen: opens a recording, switches tabs, takes pictures, tells its complaints."""
+
+from __future__ import annotations
+
+import ctypes.util
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rerun.experimental import ViewerClient
+
+VULKAN_DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
+PATIENCE_S = 60.0
+HARMLESS = ("Software rasterizer detected",)
+"""Warnings about the machine, not about the recording."""
+TOASTS_S = 6.0
+"""How long the viewer's own greetings cover a corner."""
+
+
+def why_not() -> str | None:
+    """Why the viewer cannot run here, or ``None``."""
+    if _vulkan_driver() is None or ctypes.util.find_library("vulkan") is None:
+        return "no software Vulkan here (Debian: apt-get install mesa-vulkan-drivers libvulkan1)"
+    return None
+
+
+class HeadlessViewer:
+    """One viewer process, stopped at the end of the ``with`` block."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="viewer-")
+        self._port = _free_port()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._client: ViewerClient | None = None
+        self._started = 0.0
+
+    def __enter__(self) -> HeadlessViewer:
+        home = Path(self._folder.name)
+        # Analytics stay off for this process without touching the settings of the user.
+        (home / "rerun").mkdir()
+        (home / "rerun" / "analytics.json").write_text(
+            json.dumps({"analytics_id": "none", "analytics_enabled": False, "salt": "none", "metadata": {}})
+        )
+        environment = os.environ | {
+            "VK_ICD_FILENAMES": str(_vulkan_driver()),
+            "XDG_CONFIG_HOME": str(home),
+            "XDG_RUNTIME_DIR": str(home),
+            "RERUN_FORCE_ANALYTICS": "0",
+        }
+        command = [_rerun(), "--headless", "--bind", "127.0.0.1", "--port", str(self._port), "--hide-welcome-screen"]
+        with (home / "log").open("wb") as log:
+            self._process = subprocess.Popen(command, stdout=log, stderr=log, env=environment, start_new_session=True)
+        self._started = time.monotonic()
+        self._wait("the viewer answers", self._connect)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        assert self._process is not None
+        os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        self._folder.cleanup()
+
+    def open(self, path: Path) -> None:
+        """Open a recording and wait until it is loaded."""
+        client = self._require_client()
+        client.open(str(path.resolve()))
+
+        def is_loaded() -> bool:
+            state = client.get_state()
+            return bool(state.active_recording and not state.loading and state.views)
+
+        self._wait(f"{path} is loaded", is_loaded)
+
+    def tabs(self) -> list[str]:
+        """Names of the tabs of the outermost container."""
+        blueprint, root = self._root()
+        return [_display_name(blueprint, entry) for entry in root["contents"]]
+
+    def show(self, tab: str) -> None:
+        """Bring a tab to the front."""
+        blueprint, root = self._root()
+        root["active_tab"] = next(e for e in root["contents"] if _display_name(blueprint, e) == tab)
+        self._require_client().set_blueprint(blueprint, of="recording")
+
+    def go_to(self, step: int) -> None:
+        """Put the cursor of the timeline ``step`` somewhere and leave it there."""
+        self._require_client().set_time("step", sequence=step, play_state="paused")
+
+    def last_step(self) -> int:
+        """The last step of the recording."""
+        recordings = self._require_client().get_state().recordings
+        return max(int(line.end or 0) for r in recordings for line in r.timelines if line.name == "step")
+
+    def picture(self, path: Path, settle_s: float = 0.7) -> None:
+        """Save what is seen now, once the viewer's greetings are gone."""
+        time.sleep(max(settle_s, self._started + TOASTS_S - time.monotonic()))
+        self._require_client().save_screenshot(str(path))
+
+    def complaints(self) -> list[str]:
+        """Reports of the views and warnings of the viewer about the recording."""
+        client = self._require_client()
+        reports = [
+            f"view {view.name}: {report.severity}: {report.summary} {report.details or ''}"
+            for view in client.get_state().views
+            for report in view.reports
+        ]
+        warnings = [
+            f"{entry.level} {entry.target}: {entry.message}"
+            for entry in client.get_logs()
+            if entry.level in ("WARN", "ERROR") and not entry.message.startswith(HARMLESS)
+        ]
+        return reports + warnings
+
+    def _connect(self) -> bool:
+        assert self._process is not None
+        if self._process.poll() is not None:
+            raise RuntimeError(f"the viewer ended: {self._log()}")
+        try:
+            with socket.create_connection(("127.0.0.1", self._port), timeout=1.0):
+                pass
+            self._client = ViewerClient.connect(f"rerun+http://127.0.0.1:{self._port}/proxy")
+            self._client.get_state()
+        except (OSError, RuntimeError, ConnectionError):
+            return False
+        return True
+
+    def _wait(self, what: str, happened: Callable[[], bool]) -> None:
+        end = time.monotonic() + PATIENCE_S
+        while not happened():
+            if time.monotonic() > end:
+                raise TimeoutError(f"waited {PATIENCE_S:g} s until {what}: {self._log()}")
+            time.sleep(0.1)
+
+    def _root(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        blueprint = self._require_client().get_blueprint().blueprint
+        root = blueprint["/viewport"]["ViewportBlueprint"]["root_container"]
+        return blueprint, blueprint[f"/container/{root}"]["ContainerBlueprint"]
+
+    def _require_client(self) -> ViewerClient:
+        if self._client is None:
+            raise RuntimeError("the viewer runs only inside its with block")
+        return self._client
+
+    def _log(self) -> str:
+        return (Path(self._folder.name) / "log").read_text(errors="replace")[-2000:]
+
+
+def _display_name(blueprint: dict[str, Any], entry: str) -> str:
+    kind = "ContainerBlueprint" if entry.startswith("container/") else "ViewBlueprint"
+    return str(blueprint[f"/{entry}"][kind].get("display_name", ""))
+
+
+def _vulkan_driver() -> Path | None:
+    return next((icd for folder in VULKAN_DRIVERS for icd in sorted(Path(folder).glob("lvp_icd.*.json"))), None)
+
+
+def _rerun() -> str:
+    return str(Path(sys.executable).with_name("rerun"))
+
+
+def _free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
