@@ -85,10 +85,13 @@ class Bus:
 
     def publish(self, key: str, payload: bytes, encoding: str) -> None:
         """Send to everyone who subscribes, now or soon (the cache serves late joiners)."""
-        publisher = self._publishers.get(key)
-        if publisher is None:
-            publisher = self._publishers[key] = self._declare_publisher(key)
-        publisher.put(payload, encoding=encoding)
+        self.announce(key)
+        self._publishers[key].put(payload, encoding=encoding)
+
+    def announce(self, key: str) -> None:
+        """Declare the publisher of a key, so that subscribers know it before the first message."""
+        if key not in self._publishers:
+            self._publishers[key] = self._declare_publisher(key)
 
     def _declare_publisher(self, key: str) -> Any:
         return ext.declare_advanced_publisher(

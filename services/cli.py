@@ -45,6 +45,14 @@ def _version() -> str:
     return f"lsu-mesh {__version__}"
 
 
+def _start_time(text: str) -> int | str:
+    if text == "-":
+        return text
+    if not text.isdigit():
+        raise argparse.ArgumentTypeError(f"expected nanoseconds since 1970, or -; found {text!r}")
+    return int(text)
+
+
 def _new(
     commands: argparse._SubParsersAction[argparse.ArgumentParser], name: str, words: str
 ) -> argparse.ArgumentParser:
@@ -100,7 +108,10 @@ def _add_peer(commands: argparse._SubParsersAction[argparse.ArgumentParser], rol
         parser.add_argument("name", metavar="NAME", nargs="?", default=named, help=f"name (default: {named})")
     parser.add_argument("-c", "--config", metavar="mesh.toml", help="configuration (default: the packaged demo)")
     if role in ("plant", "sensor"):
-        parser.add_argument("--start-at", type=int, metavar="NS", help="nanoseconds since 1970 when step 1 is due")
+        parser.add_argument(
+            "--start-at", type=_start_time, metavar="NS",
+            help="nanoseconds since 1970 when step 1 is due, or - to read them from standard input (default: now)",
+        )  # fmt: skip
         parser.add_argument("--rate", type=float, metavar="HZ", help="steps per second of wall clock (default: 1/dt)")
     if role == "recorder":
         parser.add_argument("--record", metavar="FILE", help="recording to write (default: recorder.path)")

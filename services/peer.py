@@ -16,6 +16,7 @@ from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
 from services.bus import Arrival, Bus, Clock, SessionSettings
 
+LOOK_AT_LINKS_NS = 100_000_000
 LONGEST_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
@@ -48,8 +49,7 @@ class Stop:
 def run_node(node: Node, settings: SessionSettings) -> int:
     """Run a node until it is told to stop; returns the exit code."""
     stop, clock = Stop(), Clock()
-    if isinstance(node, Estimator):
-        node.rehearse()
+    node.rehearse()
     with Bus(settings, clock) as bus:
         peer = Peer(node, bus, clock)
         peer.declare()
@@ -74,9 +74,13 @@ class Peer:
         self._bus = bus
         self._clock = clock
         self._mesh = node.configuration.mesh.name
+        self._links = -1
+        self._next_look = 0
 
     def declare(self) -> None:
-        """Subscriptions, the liveliness token, queries and answers."""
+        """Publishers, subscriptions, the liveliness token, queries and answers."""
+        for topic in (*self._node.publishes, "health", "event"):
+            self._bus.announce(key(self._mesh, topic, self._node.name))
         for topic, name in self._node.subscriptions():
             self._bus.subscribe(key(self._mesh, topic, name))
         self._bus.watch_alive(key(self._mesh, "live", "*"))
@@ -113,11 +117,22 @@ class Peer:
 
     def turn(self) -> None:
         """Wait for something to do, then do all of it."""
+        self._watch_links()
         arrival = self._bus.next(self._patience())
         while arrival is not None:
             self._publish(self._take(arrival))
             arrival = self._bus.next(0)
         self._publish(self._node.tick(self._clock.now()))
+
+    def _watch_links(self) -> None:
+        now = self._clock.now()
+        if now < self._next_look:
+            return
+        self._next_look = now + LOOK_AT_LINKS_NS
+        links = self._bus.links()
+        if links != self._links:
+            self._links = links
+            self._node.note_links(links)
 
     def farewell(self) -> None:
         """A last health message, so that the counts of the whole run are known."""

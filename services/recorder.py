@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import secrets
 import sys
 import time
@@ -26,7 +28,7 @@ def run_recorder(configuration: Configuration, record: str | None, settings: Ses
     stop, clock = Stop(), Clock()
     template = record or configuration.recorder.path
     moment = time.strftime("%Y%m%d-%H%M%S")
-    path = Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
+    path = _part(Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment)))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         recorder = Recorder(configuration, path)
@@ -50,6 +52,14 @@ def run_recorder(configuration: Configuration, record: str | None, settings: Ses
     return OK
 
 
+def _part(path: Path) -> Path:
+    """The path itself, or for a recorder that was started again ``NAME.2.rrd``, ``NAME.3.rrd`` …"""
+    if os.environ.get("LSU_MESH_RESTARTS", "0") == "0":
+        return path
+    parts = (path.with_name(f"{path.stem}.{number}{path.suffix}") for number in itertools.count(2))
+    return next(part for part in parts if not part.exists())
+
+
 class RecorderService:
     """The loop around the recording: drain the queue, record, flush, tell its health."""
 
@@ -63,10 +73,12 @@ class RecorderService:
         self._boot = secrets.token_hex(8)
         self._sequence = 0
         self._next_health = 0
+        self._links = -1
         self._roles = {name: role for role, name in configuration.peers()}
 
     def declare(self) -> None:
         """Subscribe to all topics, watch the peers, show that the recorder is there."""
+        self._bus.announce(key(self._mesh, "health", ROLE_NAME))
         for topic in TOPICS:
             if topic != "live":
                 self._bus.subscribe(f"{PREFIX}/{self._mesh}/{topic}/*")
@@ -81,7 +93,9 @@ class RecorderService:
             arrival = self._bus.next(0)
         now = self._clock.now()
         self._recorder.tick(now)
-        if now >= self._next_health:
+        links = self._bus.links()
+        if now >= self._next_health or links != self._links:
+            self._links = links
             self._next_health = now + 1_000_000_000
             self._tell_health(now)
 
@@ -102,6 +116,7 @@ class RecorderService:
         if self._bus.dropped:
             problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
         counters = self._gate.counters | {"queue": float(self._bus.waiting()), "dropped": float(self._bus.dropped)}
+        counters["links"] = float(self._links)
         counters |= {f"flushed {flushed}": float(seq) for flushed, seq in self._recorder.flushed.items()}
         health = Health(
             v=VERSION, src=f"{ROLE_NAME}/{ROLE_NAME}", boot=self._boot, seq=self._sequence, step=0, sent_ns=now,

@@ -59,6 +59,8 @@ class RunReport:
         self.tracks |= {name: Track("fusion", "fusion") for name in configuration.fusion}
         self.events: list[Event] = []
         self.source_steps: dict[str, int] = {}
+        self.links: dict[str, int] = {}
+        """How many others each peer is connected to."""
 
     def deliver(self, key: str, payload: bytes, arrival_ns: int) -> None:
         """Take a payload as it came."""
@@ -78,6 +80,7 @@ class RunReport:
         elif isinstance(message, Event):
             self.events.append(message)
         elif isinstance(message, Health):
+            self.links[message.name] = int(message.counters.get("links", 0))
             if message.name in self.tracks:
                 self.tracks[message.name].health = message
             elif message.role in ("plant", "sensor"):

@@ -31,7 +31,10 @@ class Child:
     restarts: int = 0
     restart_at: float | None = None
     given_up: bool = False
+    is_held: bool = False
+    """Whether the process waits for a line on its standard input before it begins."""
     words: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_WORDS))
+    line: str = ""
     reader: threading.Thread | None = None
 
     @property
@@ -52,9 +55,9 @@ class Supervisor:
         self._environment = {**os.environ, **(environment or {}), "LSU_MESH_PARENT": str(os.getpid())}
         self.children: list[Child] = []
 
-    def start(self, role: str, name: str, arguments: Sequence[str]) -> Child:
-        """Start ``lsu-mesh ROLE NAME …`` in a process of its own."""
-        child = Child(role, name, [sys.executable, "-m", "services", role, name, *arguments])
+    def start(self, role: str, name: str, arguments: Sequence[str], *, held: bool = False) -> Child:
+        """Start ``lsu-mesh ROLE NAME …`` in a process of its own; a held one waits for :meth:`tell`."""
+        child = Child(role, name, [sys.executable, "-m", "services", role, name, *arguments], is_held=held)
         self.children.append(child)
         self._launch(child)
         return child
@@ -62,16 +65,28 @@ class Supervisor:
     def _launch(self, child: Child) -> None:
         child.process = subprocess.Popen(
             child.arguments,
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE if child.is_held else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            env=self._environment,
+            env={**self._environment, "LSU_MESH_RESTARTS": str(child.restarts)},
             start_new_session=True,  # Ctrl-C at the terminal reaches the supervisor only, which stops them in order
         )
         child.reader = threading.Thread(target=_read_words, args=(child.process, child.words), daemon=True)
         child.reader.start()
+        if child.is_held and child.line:
+            self.tell(child, child.line)
+
+    def tell(self, child: Child, line: str) -> None:
+        """Write a line to a held child; when it is started again it finds the line at once."""
+        child.line = line
+        if child.process is not None and child.process.stdin is not None:
+            try:
+                child.process.stdin.write(f"{line}\n")
+                child.process.stdin.close()
+            except BrokenPipeError:
+                return  # it has died; watch() sees that
 
     def watch(self, now: float) -> list[tuple[Child, str]]:
         """Look after the children once; returns what happened, in words."""

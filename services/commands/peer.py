@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import secrets
 import sys
+import threading
 import time
 
 from lsu_mesh.mesh.config import Configuration
@@ -45,12 +46,26 @@ def _run(configuration: Configuration, options: argparse.Namespace) -> int:
     return run_node(make_node(configuration, options), settings)
 
 
+def _schedule(options: argparse.Namespace, rate: float) -> Schedule:
+    """Now, at the time given, or when standard input says it."""
+    if options.start_at != "-":
+        return Schedule(time.time_ns() if options.start_at is None else options.start_at, rate)
+    schedule = Schedule(None, rate)
+
+    def read_start() -> None:
+        line = sys.stdin.readline().strip()
+        if line.isdigit():
+            schedule.start_ns = int(line)
+
+    threading.Thread(target=read_start, daemon=True).start()
+    return schedule
+
+
 def make_node(configuration: Configuration, options: argparse.Namespace) -> Node:
     """The node of a role and name."""
     name, boot = options.name, secrets.token_hex(8)
     if options.role in ("plant", "sensor"):
-        start = options.start_at if options.start_at is not None else time.time_ns()
-        schedule = Schedule(start, configuration.mesh.rate)
+        schedule = _schedule(options, configuration.mesh.rate)
         if options.role == "plant":
             from lsu_mesh.mesh.nodes.plant import PlantNode
 

@@ -22,7 +22,9 @@ from services.table import Progress, print_json, print_table
 
 READY_S = 60.0
 """How long the peers may take to start; the first start on a machine compiles the kernels."""
-START_LEAD_S = 1.0
+LINKS_S = 10.0
+"""How long to wait for the last connections when all peers are there."""
+START_LEAD_S = 0.3
 QUIET_S = 4.0
 """The run is over when the sources have ended and nothing new has come for so long."""
 
@@ -133,26 +135,27 @@ def _announce(run: Run) -> None:
 
 
 def _start(run: Run) -> int:
-    """Start everyone who listens, wait until they are there, then the sources."""
-    _compile_kernels(run)
-    sources = {name for role, name in run.configuration.peers() if _is_source(run.configuration, role, name)}
-    listeners = [peer for peer in run.configuration.peers() if peer[1] not in sources]
-    if run.recording is None:
-        listeners = [peer for peer in listeners if peer[0] != "recorder"]
-    shared = _shared_arguments(run)
-    for role, name in listeners:
-        extra = ["--record", str(run.recording)] if role == "recorder" else []
-        run.supervisor.start(role, name, [*shared, *extra])
-    if not _await_alive(run, {name for _, name in listeners}):
-        return COULD_NOT_START
-    start_at = run.clock.now() + int(START_LEAD_S * 1e9)
+    """Start everyone, wait until all see one another, then let the sources begin."""
+    _compile_kernels()
+    names = set()
+    held = []
     for role, name in run.configuration.peers():
-        if name in sources:
-            run.supervisor.start(role, name, [*shared, "--start-at", str(start_at)])
+        if role == "recorder" and run.recording is None:
+            continue
+        is_source = _is_source(run.configuration, role, name)
+        child = run.supervisor.start(role, name, _arguments(run, role), held=is_source)
+        names.add(name)
+        if is_source:
+            held.append(child)
+    if not _await_mesh(run, names):
+        return COULD_NOT_START
+    begin = run.clock.now() + int(START_LEAD_S * 1e9)
+    for child in held:
+        run.supervisor.tell(child, str(begin))
     return OK
 
 
-def _compile_kernels(run: Run) -> None:
+def _compile_kernels() -> None:
     """Compile once here, so that the children only load."""
     from lsu_mesh.kernels.warm_up import warm_up
 
@@ -163,29 +166,38 @@ def _is_source(configuration: Configuration, role: str, name: str) -> bool:
     return role == "plant" or (role == "sensor" and configuration.sensors[name].file is not None)
 
 
-def _shared_arguments(run: Run) -> list[str]:
+def _arguments(run: Run, role: str) -> list[str]:
+    """What a child is started with: the configuration of this run."""
     file = run.options.file if run.options.file is not None else str(DEMO)
-    overrides = [*flags(run.options), *run.options.overrides]
-    network = run.configuration.network
-    arguments = ["-c", file, "-e", network.entry]
-    for override in overrides:
+    arguments = ["-c", file, "-e", run.configuration.network.entry]
+    for override in [*flags(run.options), *run.options.overrides]:
         arguments += ["-X", override]
+    if role in ("plant", "sensor"):
+        arguments += ["--start-at", "-"]
+    if role == "recorder":
+        arguments += ["--record", str(run.recording)]
     return arguments
 
 
-def _await_alive(run: Run, names: set[str]) -> bool:
-    end = time.monotonic() + READY_S
-    while not names <= run.alive:
+def _await_mesh(run: Run, names: set[str]) -> bool:
+    """Wait until every peer is there and connected to all others; False when one could not start."""
+    end, patience = time.monotonic() + READY_S, 0.0
+    while True:
         run.turn()
         if run.stop:
             run.note("stopped before the mesh was up")
             return False
         failed = [child for child in run.supervisor.children if child.given_up or child.restarts]
         if failed or time.monotonic() > end:
-            missing = ", ".join(sorted(names - run.alive))
-            run.note(f"the mesh did not come up; not there: {missing}")
+            run.note(f"the mesh did not come up; not there: {', '.join(sorted(names - run.alive))}")
             return False
-    return True
+        if names <= run.alive:
+            if all(run.report.links.get(name, 0) >= len(names) for name in names):
+                return True
+            patience = patience or time.monotonic() + LINKS_S
+            if time.monotonic() > patience:
+                run.note(f"not all peers are connected after {LINKS_S:g} s; going on: {run.report.links}")
+                return True
 
 
 def _follow(run: Run) -> None:

@@ -36,6 +36,8 @@ Base = Reference | Literal["prior", "domain"]
 Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 START_GRACE = SECOND // 2
 """How long a late joiner listens to the past before it chooses where to start."""
+REHEARSED_STEPS = 6
+"""So many steps bring a limited complexity into play."""
 BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
 
@@ -387,14 +389,14 @@ class Estimator(Node):
             step.before = None
 
     def rehearse(self) -> None:
-        """Do one step of everything and forget it, so that the first real step finds all kernels loaded."""
         before, model = self.engine.snapshot(), self.engine.model
-        if model.output_count:
-            self.engine.update(self.engine.predict_output().point)
-        self.engine.condition(self.engine.support.interval_hull())
-        to_message(self.engine.support)
-        self.engine.bounds()
-        self.engine.predict(np.zeros(model.input_count) if model.input_count else None)
+        for _ in range(REHEARSED_STEPS):
+            if model.output_count:
+                self.engine.update(self.engine.predict_output().point)
+            self.engine.condition(self.engine.support.interval_hull())
+            to_message(self.engine.support)
+            self.engine.bounds()
+            self.engine.predict(np.zeros(model.input_count) if model.input_count else None)
         self.engine.restore(before)
 
     # -- what is said of the node

@@ -36,6 +36,7 @@ class FilterNode(Estimator):
     """Runs one filter of the library on the measurements of its sensors."""
 
     role = "filter"
+    publishes = ("prediction", "posterior")
     answers = ("posterior",)
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:

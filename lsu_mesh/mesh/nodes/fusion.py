@@ -78,6 +78,7 @@ class FusionNode(Estimator):
     """``fused_k = ∩ posteriors_k ∩ (own prediction of k)`` as a constrained zonotope of limited complexity."""
 
     role = "fusion"
+    publishes = ("fused",)
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         self.settings = configuration.fusion[name]

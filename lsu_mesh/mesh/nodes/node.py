@@ -31,6 +31,8 @@ class Node(ABC):
     """
 
     role: ClassVar[str]
+    publishes: ClassVar[tuple[str, ...]] = ()
+    """Topics that the node publishes, besides health and events."""
     answers: ClassVar[tuple[str, ...]] = ()
     """Topics that come as answers to the node's queries, besides its subscriptions."""
 
@@ -42,6 +44,7 @@ class Node(ABC):
         self._sequences: dict[str, int] = {}
         self._next_health = 0
         self._warnings: dict[str, int] = {}
+        self._links = 0
         self.gate = Gate(configuration, {*(topic for topic, _ in self.subscriptions()), *self.answers})
 
     @abstractmethod
@@ -68,6 +71,15 @@ class Node(ABC):
             self._next_health = now + SECOND
             messages.append(self.health(now))
         return messages
+
+    def rehearse(self) -> None:
+        """Do once, and forget, what a step does, so that the first real step finds all kernels loaded."""
+        return
+
+    def note_links(self, count: int) -> None:
+        """How many peers and routers the process is connected to; the next tick tells."""
+        self._links = count
+        self._next_health = 0
 
     def wakeup(self) -> int | None:
         """When :meth:`tick` has something to do next, apart from health; ``None``: only after a message."""
@@ -131,7 +143,7 @@ class Node(ABC):
             reasons.append(f"waiting for {waiting}")
         if self.gate.refused:
             reasons.append(f"refused {self.gate.refused.total()} message(s), last: {self.gate.last_refusal}")
-        counters = self.gate.counters | self.counters()
+        counters = self.gate.counters | self.counters() | {"links": float(self._links)}
         return Health(
             **self.stamp("health", self.step(), now),
             role=self.role,

@@ -27,6 +27,7 @@ class PlantNode(Node):
     """
 
     role = "plant"
+    publishes = ("truth", "input")
 
     def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
         super().__init__(configuration, name, boot)
@@ -48,6 +49,9 @@ class PlantNode(Node):
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return ()
+
+    def rehearse(self) -> None:
+        next_state(self._model, self._x, np.zeros(self._model.input_count), np.zeros(self._model.rho.size))
 
     def receive(self, message: Message, now: int) -> list[Message]:
         return []

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True)
+@dataclass
 class Schedule:
-    """Step k is due at ``start_ns + (k − 1) · 1e9 / rate``."""
+    """Step k is due at ``start_ns + (k − 1) · 1e9 / rate``; without a start nothing is due yet."""
 
-    start_ns: int
+    start_ns: int | None
     rate: float
 
     def due(self, now: int) -> int:
         """The newest step that is due, 0 before the start."""
-        if now < self.start_ns:
+        if self.start_ns is None or now < self.start_ns:
             return 0
         return int((now - self.start_ns) * self.rate / 1e9) + 1
 
-    def time_of(self, step: int) -> int:
+    def time_of(self, step: int) -> int | None:
         """When a step is due, in nanoseconds."""
-        return self.start_ns + int((step - 1) / self.rate * 1e9)
+        return None if self.start_ns is None else self.start_ns + int((step - 1) / self.rate * 1e9)

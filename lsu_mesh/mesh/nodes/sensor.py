@@ -21,6 +21,7 @@ class SimulatedSensorNode(Node):
     """``y = C x + v`` with v a function of (seed, name, step), and the faults of its configuration."""
 
     role = "sensor"
+    publishes = ("measurement",)
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         super().__init__(configuration, name, boot)
@@ -32,6 +33,10 @@ class SimulatedSensorNode(Node):
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         assert self.configuration.plant is not None
         return (("truth", self.configuration.plant.name),)
+
+    def rehearse(self) -> None:
+        settings = self._settings
+        measure(settings.C, settings.r, np.zeros(len(settings.C[0])), np.zeros(len(settings.r)))
 
     def receive(self, message: Message, now: int) -> list[Message]:
         if not isinstance(message, Truth) or message.step in self._done:
@@ -78,6 +83,7 @@ class FileSensorNode(Node):
     """
 
     role = "sensor"
+    publishes = ("measurement",)
 
     def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
         super().__init__(configuration, name, boot)
