@@ -18,10 +18,103 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 SupportPoints = Callable[[Matrix], Matrix]
 """Directions (k, n) → a point of the set (k, n) that is farthest in each."""
-Surface = Callable[[Matrix, Vector, Matrix], Matrix]
-"""``(M, origin, corners)`` → vertices ``M x − origin`` (k, 3) of a solid, from the corners of an inscribed simplex."""
 
 FLAT = 1e-11
 """A width below this share of the largest width counts as none."""
 CONFIRMED = 1e-9
 """A facet is confirmed when no point lies farther than this, in units of the inscribed simplex."""
+MOST_ROUNDS = 200
+"""Rounds of refinement; where support points are less exact than ``CONFIRMED`` it would never end by itself."""
+
+
+class Polytope(NamedTuple):
+    """Vertices (k, n) and the n-dimensional volume, 0 for a flat set."""
+
+    vertices: Matrix
+    volume: float
+
+
+def enumerate_polytope(support_points: SupportPoints, n: int) -> Polytope:
+    """The polytope whose support points are given; n ≥ 1."""
+    points, simplex = _inscribed_simplex(support_points, n)
+    k = simplex.shape[0] - 1
+    if k == 0:
+        return Polytope(points[simplex], 0.0)
+    origin = points[simplex[0]]
+    edges = (points[simplex[1:]] - origin).T
+    inverse = np.linalg.pinv(edges)
+    local = (points - origin) @ inverse.T
+    if k == 1:
+        ends = [int(local[:, 0].argmin()), int(local[:, 0].argmax())]
+        length = float(local[ends[1], 0] - local[ends[0], 0]) * float(np.linalg.norm(edges))
+        return Polytope(points[ends], length if n == 1 else 0.0)
+    points, indices, volume = _refine(support_points, points, local, inverse, origin)
+    scale = abs(float(np.linalg.det(edges))) if k == n else 0.0
+    return Polytope(points[indices], volume * scale)
+
+
+def _inscribed_simplex(support_points: SupportPoints, n: int) -> tuple[Matrix, NDArray[np.int64]]:
+    """Support points and the indices of k + 1 of them that span the set's affine hull, far from degenerate."""
+    axes = np.vstack([np.eye(n), -np.eye(n)])
+    points = support_points(axes)
+    spans = points[:n] - points[n:]
+    widest = int(np.abs(np.diag(spans)).argmax())
+    largest = float(np.abs(np.diag(spans)).max())
+    chosen = [n + widest]
+    basis: list[Vector] = []
+    while len(basis) < n and largest > 0.0:
+        residual = _orthogonal_to(points - points[chosen[0]], basis)
+        far = np.einsum("ij,ij->i", residual, residual)
+        best = int(far.argmax())
+        if math.sqrt(far[best]) <= 1e-3 * largest:
+            points = np.vstack([points, support_points(_complement(basis, n))])
+            residual = _orthogonal_to(points - points[chosen[0]], basis)
+            far = np.einsum("ij,ij->i", residual, residual)
+            best = int(far.argmax())
+        distance = math.sqrt(far[best])
+        if distance <= FLAT * largest:
+            break
+        chosen.append(best)
+        basis.append(residual[best] / distance)
+    return points, np.array(chosen)
+
+
+def _orthogonal_to(vectors: Matrix, basis: list[Vector]) -> Matrix:
+    for _ in range(2):  # twice is enough for full orthogonality
+        for unit in basis:
+            vectors = vectors - np.outer(vectors @ unit, unit)
+    return vectors
+
+
+def _complement(basis: list[Vector], n: int) -> Matrix:
+    """An orthonormal basis of the complement, each direction with both signs."""
+    if not basis:
+        return np.vstack([np.eye(n), -np.eye(n)])
+    _, _, right = np.linalg.svd(np.array(basis))
+    rest = right[len(basis) :]
+    return np.vstack([rest, -rest])
+
+
+def _refine(
+    support_points: SupportPoints, points: Matrix, local: Matrix, inverse: Matrix, origin: Vector
+) -> tuple[Matrix, NDArray[np.int64], float]:
+    from scipy.spatial import ConvexHull
+
+    asked: set[bytes] = set()
+    for _ in range(MOST_ROUNDS):
+        hull = ConvexHull(local)
+        facets = np.unique(np.round(hull.equations, 10), axis=0)
+        facets = np.array([f for f in facets if f.tobytes() not in asked])
+        if facets.size == 0:
+            break
+        found = support_points(facets[:, :-1] @ inverse)
+        found_local = (found - origin) @ inverse.T
+        beyond = np.einsum("ij,ij->i", found_local, facets[:, :-1]) + facets[:, -1] > CONFIRMED
+        # Every facet is asked once: where rounding alone puts its answer beyond it, asking again would never end.
+        asked.update(f.tobytes() for f in facets)
+        if not beyond.any():
+            break
+        fresh = np.unique(np.round(found_local[beyond], 12), axis=0, return_index=True)[1]
+        points = np.vstack([points, found[beyond][fresh]])
+        local = np.vstack([local, found_local[beyond][fresh]])
+    return points, np.asarray(hull.vertices, dtype=np.int64), float(hull.volume)
