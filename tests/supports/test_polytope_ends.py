@@ -43,7 +43,7 @@ def hurried() -> Iterator[None]:
 @pytest.mark.usefixtures("hurried")
 def test_refinement_of_small_and_thin_sets_ends() -> None:
     rng = np.random.default_rng(3)
-    for _ in range(180):
+    for _ in range(61):
         drawn = small_set(rng)
         vertices = drawn.vertices()
         direction = rng.normal(size=3)
