@@ -84,7 +84,7 @@ def maximise(program: Program, d: Array, point: Array) -> tuple[float, bool]:
     for j in range(g):
         reached += d[j] * point[j]
         size += abs(d[j])
-    return value, done and value - reached <= GAP * size
+    return value, done and value - reached <= GAP * size + 1e-290
 
 
 @kernel

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.kernels.constrained import meet_sets, meet_strips
+from lsu_mesh.kernels.hull import open_program
+from lsu_mesh.kernels.surface import split_triangles
 from lsu_mesh.kernels.zonotope import absorb_box, add_centers, zonotope_map, zonotope_radius
 from lsu_mesh.supports.arrays import finite_array, frozen, map_arguments
 from lsu_mesh.supports.exact import Membership
@@ -18,6 +20,8 @@ from lsu_mesh.supports.linear_programs import is_proved_empty, safe_maxima
 from lsu_mesh.supports.polytope import Polytope, enumerate_polytope
 from lsu_mesh.supports.support import Matrix, Support, Vector
 
+MOST_POINTS = 2000
+"""Vertices that are looked for in one go in three dimensions; those beyond are found in rounds."""
 LARGEST_EXACT_VOLUME = 6
 """Dimension up to which :meth:`ConstrainedZonotope.volume` is that of the exact polytope."""
 
@@ -188,8 +192,13 @@ class ConstrainedZonotope(Support):
     def _polytope(self) -> Polytope:
         if self.is_empty():
             return Polytope(np.zeros((0, self.dim)), 0.0)
-        exact = enumerate_polytope(self._offsets, self.dim)
+        exact = enumerate_polytope(self._offsets, self.dim, self._surface)
         return Polytope(self._center + exact.vertices, exact.volume)
+
+    def _surface(self, M: Matrix, origin: Vector, corners: Matrix) -> Matrix:
+        """Vertices ``M G ξ − origin`` (k, 3) of a solid, from the corners of an inscribed simplex."""
+        _, program = open_program(self._A, self._b)
+        return split_triangles(program, M @ self._generators, origin, corners, MOST_POINTS)
 
     def _offsets(self, directions: Matrix) -> Matrix:
         """Points ``G ξ`` farthest in the directions (k, n): floating-point answers, for drawing and measuring."""

@@ -38,7 +38,7 @@ def exact_solution(
 
 
 def _reduce(rows: list[Row], order: Sequence[int]) -> list[int]:
-    """Gauss–Jordan in place, columns in this order; returns the basic variables of the first rows, as many as the rank."""
+    """Gauss–Jordan in place, columns in this order; returns the basic variables of the first rows, rank of them."""
     basis: list[int] = []
     for j in order:
         k = len(basis)

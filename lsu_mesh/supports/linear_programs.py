@@ -1,6 +1,7 @@
 """Linear programs over ``{ξ : A ξ = b, |ξ|∞ ≤ 1}`` with proved answers.
 
-The compiled simplex solves them, HiGHS those where it is troubled. Neither solver is believed, see :mod:`lsu_mesh.kernels.dual`.
+The compiled simplex solves them, HiGHS those where it is troubled. Neither is believed, see
+:mod:`lsu_mesh.kernels.dual`.
 """
 
 from __future__ import annotations

@@ -18,13 +18,13 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 SupportPoints = Callable[[Matrix], Matrix]
 """Directions (k, n) → a point of the set (k, n) that is farthest in each."""
+Surface = Callable[[Matrix, Vector, Matrix], Matrix]
+"""``(M, origin, corners)`` → vertices ``M x − origin`` (k, 3) of a solid, from the corners of an inscribed simplex."""
 
 FLAT = 1e-11
 """A width below this share of the largest width counts as none."""
 CONFIRMED = 1e-9
 """A facet is confirmed when no point lies farther than this, in units of the inscribed simplex."""
-MOST_ROUNDS = 200
-"""Rounds of refinement; where support points are less exact than ``CONFIRMED`` it would never end by itself."""
 
 
 class Polytope(NamedTuple):
@@ -34,8 +34,8 @@ class Polytope(NamedTuple):
     volume: float
 
 
-def enumerate_polytope(support_points: SupportPoints, n: int) -> Polytope:
-    """The polytope whose support points are given; n ≥ 1."""
+def enumerate_polytope(support_points: SupportPoints, n: int, surface: Surface | None = None) -> Polytope:
+    """The polytope whose support points are given; n ≥ 1. ``surface`` may find most vertices of a solid in one go."""
     points, simplex = _inscribed_simplex(support_points, n)
     k = simplex.shape[0] - 1
     if k == 0:
@@ -48,6 +48,10 @@ def enumerate_polytope(support_points: SupportPoints, n: int) -> Polytope:
         ends = [int(local[:, 0].argmin()), int(local[:, 0].argmax())]
         length = float(local[ends[1], 0] - local[ends[0], 0]) * float(np.linalg.norm(edges))
         return Polytope(points[ends], length if n == 1 else 0.0)
+    if k == 3 and surface is not None:
+        seen = surface(inverse, inverse @ origin, local[simplex])
+        local = np.vstack([local, seen])
+        points = np.vstack([points, origin + seen @ edges.T])
     points, indices, volume = _refine(support_points, points, local, inverse, origin)
     scale = abs(float(np.linalg.det(edges))) if k == n else 0.0
     return Polytope(points[indices], volume * scale)
@@ -100,21 +104,25 @@ def _refine(
 ) -> tuple[Matrix, NDArray[np.int64], float]:
     from scipy.spatial import ConvexHull
 
-    asked: set[bytes] = set()
-    for _ in range(MOST_ROUNDS):
+    asked: set[tuple[float, ...]] = set()
+    while True:
         hull = ConvexHull(local)
-        facets = np.unique(np.round(hull.equations, 10), axis=0)
-        facets = np.array([f for f in facets if f.tobytes() not in asked])
-        if facets.size == 0:
+        facets = {tuple(row) for row in np.round(hull.equations, 9).tolist()} - asked
+        if not facets:
             break
-        found = support_points(facets[:, :-1] @ inverse)
+        planes = np.array(sorted(facets))
+        found = support_points(planes[:, :-1] @ inverse)
         found_local = (found - origin) @ inverse.T
-        beyond = np.einsum("ij,ij->i", found_local, facets[:, :-1]) + facets[:, -1] > CONFIRMED
+        beyond = np.einsum("ij,ij->i", found_local, planes[:, :-1]) + planes[:, -1] > CONFIRMED
+        beyond[beyond] = _distance(found_local[beyond], local) > CONFIRMED
         # Every facet is asked once: where rounding alone puts its answer beyond it, asking again would never end.
-        asked.update(f.tobytes() for f in facets)
+        asked |= facets
         if not beyond.any():
             break
-        fresh = np.unique(np.round(found_local[beyond], 12), axis=0, return_index=True)[1]
-        points = np.vstack([points, found[beyond][fresh]])
-        local = np.vstack([local, found_local[beyond][fresh]])
+        points, local = np.vstack([points, found[beyond]]), np.vstack([local, found_local[beyond]])
     return points, np.asarray(hull.vertices, dtype=np.int64), float(hull.volume)
+
+
+def _distance(new: Matrix, known: Matrix) -> Vector:
+    """Distance of each new point to the nearest known one, in the largest coordinate."""
+    return np.array([np.abs(known - point).max(axis=1).min() for point in new])
