@@ -49,7 +49,7 @@ def read_plant(
     if x1 is not None and model is not None and len(x1) != model.state_count:
         table.wrong("x1", f"expected {model.state_count} numbers, one per state, found {len(x1)}")
     count = 0 if model is None else model.input_count
-    file = _read_file(table, count, folder, "inputs", "input")
+    file = _read_file(table, count, folder, "input")
     inputs = "file" if file is not None else table.choice("inputs", INPUTS, "normal")
     table.finish()
     return PlantSettings(name, None if x1 is None else tuple(x1), inputs, file)
@@ -72,7 +72,9 @@ def read_sensor(table: Table, name: str, states: int | None, folder: Path) -> Se
     if len(outputs) != len(rows):
         table.wrong("outputs", f"expected {len(rows)} names, one per row of C, found {len(outputs)}")
     source = table.choice("source", ("simulated", "file"), "file" if "file" in table.values else "simulated")
-    file = _read_file(table, len(rows), folder, "file", "row of C") if source == "file" else None
+    file = _read_file(table, len(rows), folder, "row of C")
+    if source == "simulated" and file is not None:
+        table.wrong("source", 'is "simulated", but a file is given; remove one of the two')
     if source == "file" and file is None and "file" not in table.values:
         table.wrong("file", 'is missing; source = "file" needs the path of a CSV file')
     faults = tuple(_read_fault(item) for item in table.tables("faults"))
@@ -92,14 +94,15 @@ def _read_fault(table: Table) -> SensorFault:
     return SensorFault(kind if isinstance(kind, str) else "bias", first, last, size)
 
 
-def _read_file(table: Table, count: int, folder: Path, key: str, per: str) -> MeasurementFileSettings | None:
+def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementFileSettings | None:
     """The keys ``file``, ``columns`` and ``time`` or ``step``; the file itself is read and checked too."""
-    if key == "inputs" and "file" not in table.values:
-        return None
     text = table.text("file", None)
     columns = table.texts("columns", None)
     by_time, by_step = table.text("time", None), table.text("step", None)
     if text is None:
+        for key in ("columns", "time", "step"):
+            if key in table.values:
+                table.wrong(key, "has no effect without file = the path of a CSV file")
         return None
     if by_time is not None and by_step is not None:
         table.wrong("step", "give either time or step, the name of the column that orders the rows, not both")
