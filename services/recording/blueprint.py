@@ -5,7 +5,7 @@ Views are built in functions, because a view object that is used twice makes the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import rerun.blueprint as rrb
 
@@ -47,9 +47,11 @@ def _overview(names: Names) -> Part:
     plots = [_bands(names, i) for i in shown]
     share = min(0.05 + 0.04 * len(names.estimators), 0.4)
     left = rrb.Vertical(_space(names, frame.ALL, ["/space/sets/**"]), _status(), row_shares=[1.0 - share, share])
-    right = [*plots, _whole("Log-volume of the sets", ["/log_volume/**"])]
-    columns = 1 if len(right) <= 4 else 2
-    return rrb.Horizontal(left, rrb.Grid(*right, grid_columns=columns), column_shares=[2, 3], name="Overview")
+    columns = 1 if len(plots) <= 3 else 2
+    volume = _whole("Log-volume of the sets", ["/log_volume/**"])
+    rows = -(-len(plots) // columns)
+    right = rrb.Vertical(rrb.Grid(*plots, grid_columns=columns), volume, row_shares=[rows, 1])
+    return rrb.Horizontal(left, right, column_shares=[2, 3], name="Overview")
 
 
 def _filter(names: Names, name: str, kind: str) -> Part:
@@ -105,8 +107,8 @@ def _bands(names: Names, state: int, peer: str | None = None) -> Part:
     part = names.states[state]
     shown = f"{path('bands', part)}/**" if peer is None else path("bands", part, peer)
     title = names.label(state) if peer else f"{names.label(state)}: truth (pink), bounds of all peers"
-    crowded = {} if peer else {path("bands", part, name): outline() for name in _outlined(names)}
-    return _plot(names, title, [shown, path("truth", part)], legend=peer is not None and state == 0, overrides=crowded)
+    crowded = [] if peer else [path("bands", part, name) for name in _outlined(names)]
+    return _plot(names, title, [shown, path("truth", part)], legend=peer is not None and state == 0, outlined=crowded)
 
 
 def _outlined(names: Names) -> list[str]:
@@ -135,7 +137,7 @@ def _plot(
     contents: list[str],
     *,
     legend: bool = True,
-    overrides: Mapping[str, rrb.Visualizer] | None = None,
+    outlined: Sequence[str] = (),
 ) -> Part:
     """Series in a window of steps that ends at the cursor; all such plots share their time axis."""
     seconds = WINDOW * names.configuration.mesh.dt
@@ -151,7 +153,7 @@ def _plot(
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
         plot_legend=rrb.PlotLegend(visible=legend),
         time_ranges=window,
-        overrides=dict(overrides) if overrides else None,
+        overrides={entity: outline() for entity in outlined} or None,
     )
 
 
@@ -165,10 +167,12 @@ def _space(names: Names, name: str, sets: list[str]) -> Part:
     origin = frame.entity(name)
     title = f"Truth (pink) in the sets of {', '.join(axes)}"
     if len(axes) < 3:  # from the top
-        eye = rrb.EyeControls3D(position=(0.0, 0.0, 3.6), look_target=(0.0, 0.0, 0.0), eye_up=(0.0, 1.0, 0.0))
-        grid = rrb.LineGrid3D(visible=False)
+        height = 0.0 if len(axes) == 2 else 0.5 * frame.LANE * (len(names.estimators) + 1)
+        position, target = (0.0, height, max(2.8, 2.5 * height)), (0.0, height, 0.0)
+        eye = rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 1.0, 0.0))
     else:
         eye = rrb.EyeControls3D(position=(1.4, -2.45, 1.25), look_target=(0.0, 0.0, -0.1), eye_up=(0.0, 0.0, 1.0))
-        grid = rrb.LineGrid3D(visible=False)
     contents = [*sets, "/space/truth", f"{origin}/**"]
-    return rrb.Spatial3DView(name=title, origin=origin, contents=contents, eye_controls=eye, line_grid=grid)
+    return rrb.Spatial3DView(
+        name=title, origin=origin, contents=contents, eye_controls=eye, line_grid=rrb.LineGrid3D(visible=False)
+    )

@@ -17,6 +17,8 @@ from services.recording.timeline import Moment, Timelines, one_row
 
 ALL = "all peers"
 """The frame of views that show several peers; no peer can have this name."""
+LANE = 0.3
+"""Height of the lane of a peer where there is only one state and sets are bars."""
 UNIFORM = 5.0
 """Axes whose scales differ by no more than this factor share one scale, so that angles are true."""
 READABLE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
@@ -68,7 +70,7 @@ class Frame:
 
     def _arrows(self, scale: Array) -> list[rr.ComponentColumn]:
         d = len(self._axes)
-        corner = np.array([-1.1] * d + [0.0] * (3 - d))
+        corner = np.array([-1.1] * d + [0.0] * (3 - d)) if d > 1 else np.array([-1.0, 0.0, 0.0])
         labels = [
             f"{label}: {size:g} {unit}".rstrip()
             for label, size, unit in zip(self._labels, scale, self._units, strict=True)

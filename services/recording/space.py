@@ -16,6 +16,7 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from lsu_mesh.mesh.messages import Posterior, SupportMessage, Truth
+from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from services.recording import frame
 from services.recording.body import Body, body, project, rectangle
 from services.recording.names import Names, path
@@ -52,7 +53,7 @@ class Space:
         self._stream = stream
         self._timelines = timelines
         self._axes = names.axes()
-        self._lanes = {peer: float(i) for i, peer in enumerate(reversed(names.estimators))}
+        self._lanes = {peer: frame.LANE * (i + 1) for i, peer in enumerate(reversed(names.estimators))}
         self._interval_ns = self._pause_ns = int(1e9 / names.configuration.recorder.mesh_hz)
         self._next_ns = 0
         self._newest = -1
@@ -64,6 +65,9 @@ class Space:
         self._half_widths: dict[str, Array] = {}
         self._fusions = set(names.configuration.fusion)
         self._style(colors)
+        body(
+            ConstrainedZonotope(np.zeros(3), np.eye(3), np.ones((1, 3)), np.zeros(1))
+        )  # loads the solvers now, not at the first set of the run
 
     def add(self, message: Posterior, arrival_ns: int) -> None:
         """A set, drawn at the next flush if its step is chosen."""
@@ -90,8 +94,9 @@ class Space:
         began = time.perf_counter_ns()
         drawn: defaultdict[str, list[_Drawn]] = defaultdict(list)
         for one in waiting:
-            self._look(one)
-            drawn[one.peer].append(_Drawn(one.moment, self._body(one)))
+            shape = self._body(one)
+            drawn[one.peer].append(_Drawn(one.moment, shape))
+            self._look(one, shape)
         for view in self._frames.values():
             view.flush()
         for peer, bodies in drawn.items():
@@ -111,9 +116,13 @@ class Space:
         if step in self._truths:
             self._points.append((Moment(step, arrival_ns), self._truths[step]))
 
-    def _look(self, one: _Set) -> None:
+    def _look(self, one: _Set, shape: Body) -> None:
         """Let the frames follow: each peer's own, and the common one, which follows the fusion where there is one."""
-        center, half = 0.5 * (one.lower + one.upper), 0.5 * (one.upper - one.lower)
+        if not len(shape.edges):
+            return
+        corners = shape.edges.reshape(-1, 3)[:, : len(self._axes)]
+        lower, upper = corners.min(axis=0), corners.max(axis=0)
+        center, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         if one.peer in self._frames:
             self._frames[one.peer].look_at(one.moment, center, half)
         self._half_widths[one.peer] = half
@@ -124,8 +133,7 @@ class Space:
 
     def _body(self, one: _Set) -> Body:
         if len(self._axes) == 1:
-            middle = self._lanes[one.peer] - 0.5 * (len(self._lanes) - 1)
-            return rectangle(float(one.lower[0]), float(one.upper[0]), 0.3 * middle, 0.12)
+            return rectangle(float(one.lower[0]), float(one.upper[0]), self._lanes.get(one.peer, 0.0), 0.4 * frame.LANE)
         return body(project(one.message, self._axes))
 
     def _send(self, peer: str, drawn: list[_Drawn]) -> None:
@@ -140,10 +148,14 @@ class Space:
         self._stream.send_columns(path("space", "sets", peer, "edges"), times, lines)
 
     def _send_points(self, points: list[tuple[Moment, list[float]]]) -> None:
-        places = np.zeros((len(points), 3))
-        places[:, : len(self._axes)] = np.array([x for _, x in points])[:, list(self._axes)]
+        heights = list(self._lanes.values()) if len(self._axes) == 1 else [0.0]
+        places = np.zeros((len(points), len(heights), 3))
+        places[:, :, : len(self._axes)] = np.array([x for _, x in points])[:, None, list(self._axes)]
+        if len(self._axes) == 1:
+            places[:, :, 1] = heights
         times = self._timelines.columns([moment for moment, _ in points])
-        self._stream.send_columns(path("space", "truth"), times, rr.Points3D.columns(positions=places))
+        columns = rr.Points3D.columns(positions=places.reshape(-1, 3)).partition([len(heights)] * len(points))
+        self._stream.send_columns(path("space", "truth"), times, columns)
 
     def _style(self, colors: dict[str, Color]) -> None:
         truth = rr.Points3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(6.0))

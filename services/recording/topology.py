@@ -9,7 +9,7 @@ from services.recording.palette import ABSENT, OTHER, Color
 from services.recording.timeline import Moment, Timelines, one_row
 
 ENTITY = "/topology"
-COLUMNS = {"plant": 0, "sensor": 1, "filter": 2, "fusion": 3, "recorder": 4}
+ROLES = ("plant", "sensor", "filter", "fusion", "recorder")
 COLUMN_WIDTH, ROW_HEIGHT = 190.0, 70.0
 
 
@@ -60,13 +60,14 @@ class Topology:
 
     def _places(self, names: list[str]) -> list[tuple[float, float]]:
         """Roles from left to right, the peers of one role below each other around the middle line."""
-        roles = [self._roles[name] for name in names]
+        roles = [self._roles[name] if self._roles[name] in ROLES else ROLES[-1] for name in names]
+        columns = [role for role in ROLES if role in roles]
         seen: dict[str, int] = {}
         places = []
         for role in roles:
             i = seen[role] = seen.get(role, -1) + 1
             y = (i - 0.5 * (roles.count(role) - 1)) * ROW_HEIGHT
-            places.append((COLUMNS.get(role, 4) * COLUMN_WIDTH, y))
+            places.append((columns.index(role) * COLUMN_WIDTH, y))
         return places
 
 
