@@ -26,6 +26,12 @@ def load_or_explain(file: str | None, options: argparse.Namespace) -> Configurat
         return None
 
 
+def print_warnings(configuration: Configuration) -> None:
+    """One line per doubt on stderr."""
+    for warning in configuration.warnings:
+        print(f"{configuration.path}: warning: {warning}", file=sys.stderr)
+
+
 def flags(options: argparse.Namespace) -> list[str]:
     """The overrides that short flags stand for."""
     named = {"steps": "mesh.steps", "rate": "mesh.rate", "seed": "mesh.seed"}

@@ -14,7 +14,7 @@ from lsu_mesh.mesh.keys import PREFIX, key, parse
 from lsu_mesh.mesh.playback import read_playback
 from services.bus import Arrival, Bus, Clock, NoSession, SessionSettings
 from services.cli import COULD_NOT_START, FAILURE, OK, USAGE
-from services.commands.configuration import DEMO, cache_size, flags, load_or_explain
+from services.commands.configuration import DEMO, cache_size, flags, load_or_explain, print_warnings
 from services.peer import Stop
 from services.report import RunReport
 from services.supervisor import Supervisor
@@ -80,6 +80,7 @@ def main(options: argparse.Namespace) -> int:
     configuration = load_or_explain(options.file, options)
     if configuration is None:
         return USAGE
+    print_warnings(configuration)
     stop = Stop()
     clock = Clock()
     network = configuration.network

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from lsu_mesh.mesh.config import ConfigurationError, load
 from services.cli import OK, USAGE
-from services.commands.configuration import print_problems
+from services.commands.configuration import print_problems, print_warnings
 
 
 def main(options: argparse.Namespace) -> int:
@@ -22,6 +22,7 @@ def main(options: argparse.Namespace) -> int:
         else:
             print_problems(error)
         return USAGE
+    print_warnings(configuration)
     peers = [f"{role} {name}" for role, name in configuration.peers()]
     if options.json:
         print(json.dumps({"valid": True, "mesh": configuration.mesh.name, "peers": peers}))

@@ -1,0 +1,54 @@
+"""The protocol's page says what the code does, and plain msgpack reads every message."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import msgpack
+import pytest
+
+from lsu_mesh.mesh.messages import TYPES, Message, decode, encode, example
+
+
+@pytest.fixture(scope="module")
+def page(root: Path) -> str:
+    return (root / "docs" / "protocol.md").read_text()
+
+
+def documented(page: str, heading: str) -> set[str]:
+    """Fields in the tables below a heading."""
+    section = page.split(f"### {heading}\n")[1].split("\n#")[0]
+    cells = [row.split("|")[1] for row in section.splitlines() if row.startswith("| `")]
+    return {field for cell in cells for field in re.findall(r"`(\w+)`", cell)}
+
+
+@pytest.mark.parametrize("topic", sorted(TYPES))
+def test_the_page_lists_exactly_the_fields_of_a_topic(page: str, topic: str) -> None:
+    fields = set(TYPES[topic].__struct_fields__)
+    common = set(Message.__struct_fields__)
+    listed = documented(page, f"`{topic}`")
+    if topic == "fused":
+        listed |= documented(page, "`posterior`")
+    assert listed == fields - common
+    assert documented(page, "Common fields") == common
+
+
+@pytest.mark.parametrize("topic", sorted(TYPES))
+def test_plain_msgpack_reads_what_we_write_and_we_read_what_it_writes(topic: str) -> None:
+    message = example(topic)
+    plain = msgpack.unpackb(encode(message))
+    assert isinstance(plain, dict)
+    assert set(plain) == set(TYPES[topic].__struct_fields__)
+    assert decode(topic, msgpack.packb(plain)) == message
+
+
+def test_the_example_on_the_page_is_what_the_code_prints(page: str) -> None:
+    shown = json.loads(page.split("```json\n")[1].split("```")[0])
+    assert shown == msgpack.unpackb(encode(example("posterior")))
+
+
+def test_every_topic_has_a_key_on_the_page(page: str) -> None:
+    for topic in TYPES:
+        assert f"`lsu/v1/M/{topic}/NAME`" in page

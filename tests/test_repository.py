@@ -1,0 +1,59 @@
+"""What is committed is the project's own and holds no trace of a machine."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+MACHINE = re.compile(r"(^|[^\w./-])/(work|farm|root|home)/\w", re.MULTILINE)
+REGISTRY = re.compile(r"https?://[^ )\"]*/simple|files\.pythonhosted|registry\.npmjs")
+
+
+@pytest.fixture(scope="module")
+def tracked(root: Path) -> list[Path]:
+    try:
+        listed = subprocess.run(["git", "ls-files"], cwd=root, capture_output=True, text=True, check=True).stdout
+    except (FileNotFoundError, subprocess.CalledProcessError):
+        pytest.skip("not a git checkout")
+    return [root / name for name in listed.splitlines() if (root / name).is_file()]
+
+
+def texts(tracked: list[Path]) -> list[tuple[Path, str]]:
+    return [(path, path.read_text(encoding="utf-8")) for path in tracked if path.suffix not in (".png", ".rrd")]
+
+
+def test_no_file_holds_a_path_of_a_machine_or_the_address_of_a_registry(tracked: list[Path]) -> None:
+    own = Path(__file__).name
+    guilty = [
+        path for path, text in texts(tracked) if path.name != own and (MACHINE.search(text) or REGISTRY.search(text))
+    ]
+    assert guilty == []
+
+
+def test_the_constraints_hold_names_and_versions_only(root: Path) -> None:
+    lines = [line for line in (root / "constraints.txt").read_text().splitlines() if line and not line.startswith("#")]
+    assert lines
+    assert [line for line in lines if not re.fullmatch(r"[A-Za-z0-9_.-]+==[A-Za-z0-9.]+", line)] == []
+
+
+def test_every_make_command_that_the_readme_names_exists(root: Path) -> None:
+    makefile = (root / "Makefile").read_text()
+    for page in [root / "README.md", *sorted((root / "docs").glob("*.md"))]:
+        for target in re.findall(r"`?make ([a-z-]+)", page.read_text()):
+            if page.name == "README.md" or f"make {target}`" in page.read_text():
+                assert re.search(rf"^{target}:", makefile, re.MULTILINE), f"{page.name}: make {target}"
+
+
+def test_every_link_of_the_pages_leads_somewhere(root: Path) -> None:
+    for page in [root / "README.md", root / "CHANGELOG.md", *sorted((root / "docs").rglob("*.md"))]:
+        for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
+            if not target.startswith("http"):
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_no_python_file_grows_past_what_one_can_read(tracked: list[Path]) -> None:
+    long = {path.name: len(text.splitlines()) for path, text in texts(tracked) if path.suffix == ".py"}
+    assert {name: lines for name, lines in long.items() if lines > 500} == {}
