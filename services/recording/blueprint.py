@@ -95,7 +95,12 @@ def _mesh() -> Part:
 
 
 def _events() -> Part:
-    return rrb.TextLogView(name="Events", origin="/events")
+    kinds = rrb.encodings.TextLogColumnKind
+    columns = rrb.TextLogColumns(
+        timeline_columns=[rrb.encodings.TimelineColumn(STEP, visible=False)],
+        text_log_columns=[rrb.encodings.TextLogColumn(kind) for kind in (kinds.LogLevel, kinds.Body)],
+    )
+    return rrb.TextLogView(name="Events", origin="/events", columns=columns)
 
 
 def _grid(name: str, views: Sequence[Part]) -> Part:

@@ -27,7 +27,7 @@ class Events:
 
     def tell(self, peer: str, moment: Moment, level: str, text: str) -> None:
         """A line of text about a peer."""
-        self._rows[path("events", peer)].append((moment, level, text))
+        self._rows[path("events", peer)].append((moment, level, f"step {moment.step}, {peer}: {text}"))
 
     def flush(self) -> None:
         """Send all lines that wait."""

@@ -127,6 +127,7 @@ class Recorder:
         if self._closed:
             return
         self._closed = True
+        self._guarded("drawing space", self._space.finish)
         self.flush()
         self._guarded("closing the file", self._stream.disconnect)
 
@@ -153,7 +154,7 @@ class Recorder:
         now = self._now(now_ns)
         self._status.peer_changed(name, alive, now)
         self._topology.peer_changed(role, name, alive, now)
-        self._events.tell(name, now, "INFO" if alive else "WARN", f"{role} {name} {'is there' if alive else 'is gone'}")
+        self._events.tell(name, now, "INFO" if alive else "WARN", f"{role} {'is there' if alive else 'is gone'}")
 
     def _now(self, now_ns: int) -> Moment:
         """The moment of what belongs to no step of its own."""

@@ -18,11 +18,15 @@ from numpy.typing import NDArray
 from lsu_mesh.mesh.messages import Posterior, SupportMessage, Truth
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from services.recording import frame
-from services.recording.body import Body, body, project, rectangle
+from services.recording.body import EMPTY, Body, body, project, rectangle
 from services.recording.names import Names, path
 from services.recording.palette import TRUTH, Color
 from services.recording.timeline import Moment, Timelines
 
+LONGEST_PAUSE_NS = 2_000_000_000
+"""However slow the bodies are, some are drawn."""
+GRACE_NS = 1_000_000_000
+"""How long a chosen step waits for its last set; all sets of one moment shall be of one step."""
 REMEMBERED = 256
 """Chosen steps, and truths, that are kept for sets and truths that come late."""
 SHARE = 0.15
@@ -35,8 +39,8 @@ class _Set(NamedTuple):
     moment: Moment
     peer: str
     message: SupportMessage
-    lower: Array
-    upper: Array
+    lower: float
+    upper: float
 
 
 class _Drawn(NamedTuple):
@@ -59,53 +63,84 @@ class Space:
         self._newest = -1
         self._chosen: dict[int, Moment] = {}
         self._truths: dict[int, list[float]] = {}
-        self._waiting: list[_Set] = []
+        self._waiting: dict[int, list[_Set]] = {}
+        self._newest_ns = 0
+        self._drawn_steps: dict[int, None] = {}
+        self._shown: set[str] = set()
+        self._estimators = set(names.estimators)
         self._points: list[tuple[Moment, list[float]]] = []
         self._frames = {name: frame.Frame(stream, timelines, names, name) for name in (frame.ALL, *names.estimators)}
         self._half_widths: dict[str, Array] = {}
         self._fusions = set(names.configuration.fusion)
         self._style(colors)
-        body(
-            ConstrainedZonotope(np.zeros(3), np.eye(3), np.ones((1, 3)), np.zeros(1))
-        )  # loads the solvers now, not at the first set of the run
+        _load_solvers()
 
     def add(self, message: Posterior, arrival_ns: int) -> None:
         """A set, drawn at the next flush if its step is chosen."""
         step = message.step
+        self._newest_ns = max(self._newest_ns, arrival_ns)
         if step > self._newest and arrival_ns >= self._next_ns:
             self._choose(step, arrival_ns)
         if step in self._chosen:
-            axes = list(self._axes)
-            lower, upper = np.array(message.lower)[axes], np.array(message.upper)[axes]
-            self._waiting.append(_Set(Moment(step, arrival_ns), message.name, message.support, lower, upper))
+            first = self._axes[0]
+            interval = message.lower[first], message.upper[first]
+            one = _Set(Moment(step, arrival_ns), message.name, message.support, *interval)
+            self._waiting.setdefault(step, []).append(one)
 
     def add_truth(self, message: Truth, arrival_ns: int) -> None:
         """The true state, drawn where its step is or will be chosen."""
         self._truths[message.step] = message.x
         if len(self._truths) > REMEMBERED:
             del self._truths[next(iter(self._truths))]
-        if message.step in self._chosen:
+        if message.step in self._drawn_steps:
             self._points.append((Moment(message.step, arrival_ns), message.x))
 
     def flush(self) -> None:
-        """Make and send all bodies that wait."""
-        waiting, self._waiting = self._waiting, []
-        points, self._points = self._points, []
+        """Make and send the bodies of the steps whose sets are all there or have waited long enough."""
+        ready = [step for step, sets in self._waiting.items() if self._is_complete(sets) or self._has_waited(sets)]
+        self._draw(ready)
+
+    def finish(self) -> None:
+        """Send the rest; a last step that lacks sets is left out, it would stand beside sets of an earlier step."""
+        self.flush()
+        if not self._drawn_steps:
+            self._draw(list(self._waiting))
+
+    def _draw(self, steps: list[int]) -> None:
         began = time.perf_counter_ns()
         drawn: defaultdict[str, list[_Drawn]] = defaultdict(list)
-        for one in waiting:
-            shape = self._body(one)
-            drawn[one.peer].append(_Drawn(one.moment, shape))
-            self._look(one, shape)
+        for step in sorted(steps):
+            self._draw_step(step, self._waiting.pop(step), drawn)
         for view in self._frames.values():
             view.flush()
         for peer, bodies in drawn.items():
             self._send(peer, bodies)
-        if points:
-            self._send_points(points)
-        if waiting:
-            steps = len({one.moment.step for one in waiting})
-            self._pause_ns = max(self._interval_ns, int((time.perf_counter_ns() - began) / steps / SHARE))
+        self._send_points()
+        if steps:
+            spent = (time.perf_counter_ns() - began) / len(steps)
+            self._pause_ns = min(max(self._interval_ns, int(spent / SHARE)), LONGEST_PAUSE_NS)
+
+    def _draw_step(self, step: int, sets: list[_Set], drawn: defaultdict[str, list[_Drawn]]) -> None:
+        for one in sorted(sets, key=lambda one: one.peer in self._fusions):  # the common frame sees fusions last
+            shape = self._body(one)
+            drawn[one.peer].append(_Drawn(one.moment, shape))
+            self._look(one, shape)
+            self._shown.add(one.peer)
+        if step not in self._drawn_steps:
+            self._drawn_steps[step] = None
+            if step in self._truths:
+                self._points.append((sets[0].moment, self._truths[step]))
+            for peer in self._shown - {one.peer for one in sets}:  # whoever is silent must not show an old set
+                drawn[peer].append(_Drawn(sets[0].moment, EMPTY))
+                self._shown.discard(peer)
+        if len(self._drawn_steps) > REMEMBERED:
+            del self._drawn_steps[next(iter(self._drawn_steps))]
+
+    def _is_complete(self, sets: list[_Set]) -> bool:
+        return self._estimators <= {one.peer for one in sets}
+
+    def _has_waited(self, sets: list[_Set]) -> bool:
+        return self._newest_ns - sets[0].moment.wall_ns > GRACE_NS or sets[0].moment.step in self._drawn_steps
 
     def _choose(self, step: int, arrival_ns: int) -> None:
         self._newest = step
@@ -113,8 +148,6 @@ class Space:
         if len(self._chosen) > REMEMBERED:
             del self._chosen[next(iter(self._chosen))]
         self._next_ns = max(self._next_ns, arrival_ns - self._pause_ns) + self._pause_ns
-        if step in self._truths:
-            self._points.append((Moment(step, arrival_ns), self._truths[step]))
 
     def _look(self, one: _Set, shape: Body) -> None:
         """Let the frames follow: each peer's own, and the common one, which follows the fusion where there is one."""
@@ -133,7 +166,7 @@ class Space:
 
     def _body(self, one: _Set) -> Body:
         if len(self._axes) == 1:
-            return rectangle(float(one.lower[0]), float(one.upper[0]), self._lanes.get(one.peer, 0.0), 0.4 * frame.LANE)
+            return rectangle(one.lower, one.upper, self._lanes.get(one.peer, 0.0), 0.4 * frame.LANE)
         return body(project(one.message, self._axes))
 
     def _send(self, peer: str, drawn: list[_Drawn]) -> None:
@@ -147,7 +180,10 @@ class Space:
         lines = rr.LineStrips3D.columns(strips=strips).partition([len(one.body.edges) for one in drawn])
         self._stream.send_columns(path("space", "sets", peer, "edges"), times, lines)
 
-    def _send_points(self, points: list[tuple[Moment, list[float]]]) -> None:
+    def _send_points(self) -> None:
+        points, self._points = self._points, []
+        if not points:
+            return
         heights = list(self._lanes.values()) if len(self._axes) == 1 else [0.0]
         places = np.zeros((len(points), len(heights), 3))
         places[:, :, : len(self._axes)] = np.array([x for _, x in points])[:, None, list(self._axes)]
@@ -165,3 +201,9 @@ class Space:
             self._stream.log(path("space", "sets", peer), mesh, static=True)
             edges = rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(1.2))
             self._stream.log(path("space", "sets", peer, "edges"), edges, static=True)
+
+
+def _load_solvers() -> None:
+    """Load everything that a body needs now, not at the first set of the run."""
+    generators = np.hstack([np.eye(3), np.ones((3, 1))])
+    body(ConstrainedZonotope(np.zeros(3), generators, np.ones((1, 4)), np.zeros(1)))
