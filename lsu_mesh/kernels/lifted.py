@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
+from lsu_mesh.kernels.scaling import unit_factor
 
 Array = NDArray[np.float64]
 
@@ -66,13 +67,7 @@ def scale_constraints(n: int, L: Array, middle: Array, slack: Array) -> None:
         largest = 0.0
         for j in range(g):
             largest = max(largest, abs(L[i, j]))
-        if not 2.0**-900 < largest < 2.0**900:
-            continue
-        factor = 1.0
-        while largest * factor >= 1.0:
-            factor *= 0.5
-        while largest * factor < 0.5:
-            factor *= 2.0
+        factor = unit_factor(largest)
         if factor != 1.0:
             for j in range(g):
                 L[i, j] *= factor

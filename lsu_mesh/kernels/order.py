@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.lifted import row_scales
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
+from lsu_mesh.kernels.scaling import unit_factor
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -106,13 +107,17 @@ def independent_columns(L: Array) -> tuple[Array, Indices]:
 
 @kernel
 def approximate_inverse(D: Array) -> Array:
-    """``M ≈ D⁻¹`` (N, N) by Gauss–Jordan elimination with row pivoting; not finite where D is singular."""
+    """``M ≈ D⁻¹`` (N, N) by Gauss–Jordan elimination with pivoting of scaled rows; not finite for singular D."""
     N = D.shape[0]
     W = np.zeros((N, 2 * N))
     for i in range(N):
+        largest = 0.0
         for j in range(N):
-            W[i, j] = D[i, j]
-        W[i, N + i] = 1.0
+            largest = max(largest, abs(D[i, j]))
+        factor = unit_factor(largest)
+        for j in range(N):
+            W[i, j] = D[i, j] * factor
+        W[i, N + i] = factor
     for k in range(N):
         p = k
         for i in range(k + 1, N):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.scaling import unit_factor
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -39,12 +40,7 @@ def scaled_rows(A: Array, b: Array) -> tuple[Array, Array]:
         largest = 0.0
         for j in range(g):
             largest = max(largest, abs(A[i, j]))
-        factor = 1.0
-        if 2.0**-900 < largest < 2.0**900:
-            while largest * factor >= 1.0:
-                factor *= 0.5
-            while largest * factor < 0.5:
-                factor *= 2.0
+        factor = unit_factor(largest)
         for j in range(g):
             rows[i, j] = A[i, j] * factor
         sides[i] = b[i] * factor
