@@ -107,10 +107,10 @@ def test_hull_width_on_p3() -> None:
 
 @pytest.mark.parametrize("nu", [1e-4, 1e-3, 1e-2, 0.1, 1.0])
 def test_rmse_of_p2023(nu: float) -> None:
-    """For ω = 1e-4 the error from step 10 of 600 on is at most 1.3e-4 for every ν; the state starts within ±0.1."""
+    """For ω = 1e-4 the error from step 10 of 600 on is at most 1.3e-4 for every ν; the state starts within ±0.01."""
     model = systems.get("P3", 1e-4, nu)
-    states, outputs, inputs = _measured(model, 1, 600, spread=0.1)
-    estimator = LSUCZ(model, Orthotope(-0.1 * np.ones(3), 0.1 * np.ones(3)))
+    states, outputs, inputs = _measured(model, 1, 600, spread=0.01)
+    estimator = LSUCZ(model, Orthotope(-0.01 * np.ones(3), 0.01 * np.ones(3)))
     errors = []
     for x, y, u in zip(states, outputs, inputs, strict=True):
         estimator.update(y)
