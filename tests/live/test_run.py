@@ -17,10 +17,16 @@ pytestmark = pytest.mark.live
 Start = Callable[..., object]
 
 
-def until_steps_flow(session, words: str = "plant plant") -> None:  # type: ignore[no-untyped-def]
-    """Wait until the plant runs, which is started last."""
-    session.child(words)
-    time.sleep(2.0)  # the plant's first step is due a second after its start
+def until_steps_flow(session, timeout: float = 90.0) -> None:  # type: ignore[no-untyped-def]
+    """Wait for the first fused set on the mesh."""
+    from services.bus import Bus, Clock, SessionSettings
+
+    end = time.monotonic() + timeout
+    with Bus(SessionSettings(connect=(session.endpoint,)), Clock()) as bus:
+        bus.subscribe("lsu/v1/*/fused/*")
+        while bus.next(0.2) is None:
+            assert time.monotonic() < end, "no fused set came"
+            assert session.process.poll() is None, session.process.communicate()
 
 
 def test_the_demo_holds_the_truth_in_every_step_and_leaves_no_process(start_run) -> None:  # type: ignore[no-untyped-def]
