@@ -17,7 +17,7 @@ $(READY): pyproject.toml constraints.txt
 	@echo "installing into .venv …"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[mesh,dev]"
 	@echo "compiling the kernels …"
-	@$(BIN)/python -m lsu_mesh.kernels.warm_up
+	@$(BIN)/python -m lsu_mesh.filters.warm_up
 	@touch $(READY)
 
 run: $(READY) ## run the demo: three sensors, three filters, a fusion, a recorder

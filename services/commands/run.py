@@ -158,7 +158,7 @@ def _start(run: Run) -> int:
 
 def _compile_kernels() -> None:
     """Compile once here, so that the children only load."""
-    from lsu_mesh.kernels.warm_up import warm_up
+    from lsu_mesh.filters.warm_up import warm_up
 
     warm_up()
 
