@@ -33,26 +33,32 @@ def absolute_row_sums(A: Array) -> Array:
 
 @kernel
 def dual_bound(d: Array, A: Array, b: Array, row_sums: Array, y: Array) -> float:
+    """:func:`dual_bound_in` with room of its own."""
+    return dual_bound_in(d, A, b, row_sums, y, np.empty(d.size))
+
+
+@kernel
+def dual_bound_in(d: Array, A: Array, b: Array, row_sums: Array, y: Array, reduced: Array) -> float:
     """Upper bound of ``max {d'ξ : A ξ = b, |ξ|∞ ≤ 1}`` from the multipliers y (m,), rounded up.
 
-    d (g,), A (m, g), b (m,); ``row_sums`` from :func:`absolute_row_sums`. A y that is not finite counts as 0.
+    d (g,), A (m, g), b (m,); ``row_sums`` from :func:`absolute_row_sums`; ``reduced`` (≥ g,) is room.
+    A y that is not finite counts as 0.
 
     Rounding. Each ``t_j = d_j − Σ_i A_ij y_i`` is off by at most ``γ_{m+1} (|d_j| + Σ_i |A_ij y_i|)``; summed over j
     that is ``γ_{m+1} (Σ|d_j| + Σ_i |y_i| row_sums_i)``. ``Σ b_i y_i`` is off by ``γ_m Σ|b_i y_i|`` and the final sum of
     g + 1 terms by ``γ_{g+1}`` times the sum of their moduli. The three are added with a few operations to spare.
     """
     m, g = A.shape
+    finite = True
     for i in range(m):
-        if not np.isfinite(y[i]):
-            return dual_bound(d, A, b, row_sums, np.zeros(m))
-    reduced = np.empty(g)
+        finite = finite and np.isfinite(y[i])
     mass = 0.0
     for j in range(g):
         reduced[j] = d[j]
         mass += abs(d[j])
     level = 0.0
     for i in range(m):
-        factor = y[i]
+        factor = y[i] if finite else 0.0
         if factor != 0.0:
             row = A[i]
             for j in range(g):

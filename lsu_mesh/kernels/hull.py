@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import kernel
-from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound
+from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound_in
 from lsu_mesh.kernels.simplex import (
     basic_levels,
     canonical_tableau,
@@ -34,7 +34,7 @@ GAP = 1e-9
 
 class Program(NamedTuple):
     """A feasible set with a vertex of it: scaled rows (m, g), their sides (m,) and absolute sums (m,), the tableau
-    (m, g + m), basis (m,), nonbasic bounds (g,), basic levels (m,), and room for multipliers (m,)."""
+    (m, g + m), basis (m,), nonbasic bounds (g,), basic levels (m,), and room for multipliers (m,), costs (g + m,)."""
 
     rows: Array
     sides: Array
@@ -44,6 +44,7 @@ class Program(NamedTuple):
     at: Array
     level: Array
     multipliers: Array
+    costs: Array
 
 
 @kernel
@@ -53,7 +54,7 @@ def open_program(A: Array, b: Array) -> tuple[int, Program]:
     rows, sides = scaled_rows(A, b)
     sums = absolute_row_sums(rows)
     tableau, basis = canonical_tableau(rows)
-    program = Program(rows, sides, sums, tableau, basis, np.empty(g), np.empty(m), np.zeros(m))
+    program = Program(rows, sides, sums, tableau, basis, np.empty(g), np.empty(m), np.zeros(m), np.empty(g + m))
     starting_bounds(tableau, sides, basis, program.at, program.level)
     if _contradicts(program):
         return EMPTY, program
@@ -71,9 +72,9 @@ def maximise(program: Program, d: Array, point: Array) -> tuple[float, bool]:
     """
     m, g = program.rows.shape
     basic_levels(program.tableau, program.sides, program.basis, program.at, program.level)
-    done = climb(program.tableau, program.basis, program.at, program.level, d, program.multipliers)
+    done = climb(program.tableau, program.basis, program.at, program.level, d, program.costs, program.multipliers)
     refine_multipliers(program.rows, program.tableau, program.basis, d, program.multipliers)
-    value = dual_bound(d, program.rows, program.sides, program.sums, program.multipliers)
+    value = dual_bound_in(d, program.rows, program.sides, program.sums, program.multipliers, program.costs)
     for j in range(g):
         point[j] = program.at[j]
     for i in range(m):
@@ -156,7 +157,7 @@ def _contradicts(program: Program) -> bool:
             sign = -1.0 if program.level[i] > 0.0 else 1.0
             for k in range(m):
                 y[k] = sign * program.tableau[i, g + k]
-            if dual_bound(np.zeros(g), program.rows, program.sides, program.sums, y) < 0.0:
+            if dual_bound_in(np.zeros(g), program.rows, program.sides, program.sums, y, program.costs) < 0.0:
                 return True
     return False
 
@@ -172,4 +173,4 @@ def _farkas(program: Program, sigma: Array) -> bool:
             some = True
             for k in range(m):
                 y[k] -= sigma[i] * program.tableau[i, g + k]
-    return some and dual_bound(np.zeros(g), program.rows, program.sides, program.sums, y) < 0.0
+    return some and dual_bound_in(np.zeros(g), program.rows, program.sides, program.sums, y, program.costs) < 0.0

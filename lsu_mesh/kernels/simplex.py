@@ -245,15 +245,19 @@ def find_vertex(T: Array, basis: Indices, at: Array, level: Array, sigma: Array)
 
 
 @kernel
-def climb(T: Array, basis: Indices, at: Array, level: Array, d: Array, y: Array) -> bool:
-    """Phase two: from a feasible vertex to one that maximises d; multipliers to y (m,). ``False`` at the limit."""
+def climb(T: Array, basis: Indices, at: Array, level: Array, d: Array, reduced: Array, y: Array) -> bool:
+    """Phase two: from a feasible vertex to one that maximises d; multipliers to y (m,). ``False`` at the limit.
+
+    ``reduced`` (g + m,) is room for the reduced costs.
+    """
     m = T.shape[0]
     g = at.size
     largest = 0.0
-    reduced = np.zeros(g + m)
     for j in range(g):
         largest = max(largest, abs(d[j]))
         reduced[j] = d[j]
+    for i in range(m):
+        reduced[g + i] = 0.0
     for i in range(m):
         if basis[i] >= 0:
             cost = d[basis[i]]

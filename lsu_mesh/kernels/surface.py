@@ -24,7 +24,7 @@ CONFIRMED = 1e-9
 def farthest(program: Program, d: Array, point: Array) -> None:
     """A vertex ξ (g,) that maximises ``d'ξ``, in floating point; the program is left there."""
     basic_levels(program.tableau, program.sides, program.basis, program.at, program.level)
-    climb(program.tableau, program.basis, program.at, program.level, d, program.multipliers)
+    climb(program.tableau, program.basis, program.at, program.level, d, program.costs, program.multipliers)
     for j in range(point.size):
         point[j] = program.at[j]
     for i in range(program.basis.size):
