@@ -170,7 +170,7 @@ class LSUCZ(Filter):
         other = checked_prior(self._model, support)
         before = self.bounds()
         lower, upper = other.bounds()
-        box = np.maximum(self._held.lower, lower), np.minimum(self._held.upper, upper)
+        box = np.maximum(before[0], lower), np.minimum(before[1], upper)
         try:
             met = meet_sets(*self._held.body, *self._transferable(other))
             self._hold(self._settled((self._held.body[0], *met), *box))

@@ -7,13 +7,14 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.errors import ModelError
+from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.kernels import parallelotope, step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
 
+Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 TimeUpdate = Literal["image", "cgz", "edges", "strips"]
 
@@ -25,6 +26,8 @@ TIME_UPDATES: dict[str, int] = {
 }
 LARGEST_EXHAUSTIVE = 6
 """States up to which ``time_update="edges"`` tries all combinations of edges."""
+ROUNDING = 1e-12
+"""Share of a bound's size by which a new hull may exceed it and still count as not wider."""
 
 
 class LSUP(CompiledFilter):
@@ -61,6 +64,44 @@ class LSUP(CompiledFilter):
             )
         super().__init__(model, prior, option=TIME_UPDATES[time_update])
         self.time_update = time_update
+
+    def condition(self, support: Support) -> float:
+        """Bayesian transfer that never widens :meth:`bounds`, but for rounding; the gain is that of the parallelotopes.
+
+        A strip that takes the place of an own one can push the hull out. Where that happens the edges keep their
+        directions and are shortened to what the intersection reaches along them, by verified linear programs.
+        """
+        before, hull, volume = self._state, self.bounds(), self._log_volume(self._state)
+        gain = super().condition(support)
+        if not self._widens(self._state, hull):
+            return gain
+        self._state = before
+        shortened = self._shortened(support)
+        if shortened is None or self._widens(shortened, hull):
+            return 0.0
+        self._state = shortened
+        return max(0.0, volume - self._log_volume(shortened)) if volume > -np.inf else 0.0
+
+    def _widens(self, state: Matrix, hull: tuple[Vector, Vector]) -> bool:
+        """Whether the hull of a state exceeds another one by more than rounding."""
+        _, lower, upper, _ = self._describe(state)
+        rounding = ROUNDING * np.maximum(np.abs(hull[0]), np.abs(hull[1]))
+        return bool((lower < hull[0] - rounding).any() or (upper > hull[1] + rounding).any())
+
+    def _shortened(self, support: Support) -> Matrix | None:
+        """The state with edges as long as its intersection with ``support`` is along them; ``None`` for a flat one."""
+        body = self._make_support(self._state)
+        joint = body.to_constrained_zonotope().intersect(support)
+        if joint.is_empty():
+            raise InconsistentData("the set of LSUP and the transferred set have no point in common")
+        strips = body.strips()
+        if strips is None:
+            return None
+        low, high = joint.ranges(strips[0])
+        middle = 0.5 * low + 0.5 * high
+        radius = np.nextafter(np.maximum(high - middle, middle - low), np.inf)
+        state, status = self._cut(self._state, strips[0], middle, radius)
+        return state if status == 0 else None
 
     @staticmethod
     def _enclose(support: Support) -> Matrix:

@@ -174,7 +174,7 @@ class ZonotopicKalman(Filter):
         """Keep a zonotope that holds ``X ∩ support``, and the box of ``support``; the gain is that of the hulls.
 
         The faces of the box are offered as strips to the gain; the result is kept where it shrinks the hull, else the
-        set stays as it is and only the bounds are met.
+        set stays as it is. :meth:`bounds` never widen: they stay met with what they were, and with the box.
         """
         other = checked_prior(self._model, support)
         before = self.bounds()
@@ -183,7 +183,7 @@ class ZonotopicKalman(Filter):
         strips = Strips(np.eye(box.dim), np.array(box.center), np.array(box.half_widths))
         if self._excludes(strips) or self.support.intersect(other).is_empty():
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
-        met = self._held._replace(lower=np.maximum(self._held.lower, lower), upper=np.minimum(self._held.upper, upper))
+        met = self._held._replace(lower=np.maximum(before[0], lower), upper=np.minimum(before[1], upper))
         if _is_contradictory(met):
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
         shrunk = _corrected(met._replace(pending=_no_strips(box.dim)), strips)._replace(pending=met.pending)
