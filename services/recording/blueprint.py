@@ -55,11 +55,11 @@ def _overview(names: Names) -> Part:
 
 
 def _filter(names: Names, name: str, kind: str) -> Part:
-    left = rrb.Vertical(
-        _space(names, name, [f"{path('space', 'sets', name)}/**"]),
-        _plot(names, "Widths", [path("widths", name)]),
-        row_shares=[3, 1],
-    )
+    below = [_plot(names, "Widths", [path("widths", name)])]
+    if names.configuration.filters[name].transfer != "off":
+        below.append(_plot(names, "Gain of the transfers [nat]", [path("gain", name)], legend=False))
+    space = _space(names, name, [f"{path('space', 'sets', name)}/**"])
+    left = rrb.Vertical(space, *below, row_shares=[3.0] + [1.0] * len(below))
     return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=f"{name} ({kind})")
 
 

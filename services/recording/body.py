@@ -88,6 +88,8 @@ def hull_body(points: Array) -> Body:
     center = points.mean(axis=0)
     # In the principal frame, stretched to unit spread, a thin set is as easy as a round one.
     _, spreads, frame = np.linalg.svd(points - center, full_matrices=False)
+    if len(frame) == 3 and np.linalg.det(frame) < 0:
+        frame[2] *= -1.0  # a reflection would turn every facet inside out
     rank = int((spreads > FLAT * max(spreads[0], FLAT * np.abs(points).max())).sum())
     while rank >= 2:
         local = (points - center) @ frame[:rank].T / spreads[:rank]

@@ -28,6 +28,7 @@ class _Row(NamedTuple):
     point: list[float]
     upper: list[float]
     log_volume: float | None
+    gain: float | None
     latency_ms: float
 
 
@@ -65,7 +66,7 @@ class Estimates:
         """A posterior or a fused set."""
         moment = Moment(message.step, arrival_ns)
         latency = (arrival_ns - message.origin_ns) / 1e6
-        row = _Row(moment, message.lower, message.point, message.upper, message.log_volume, latency)
+        row = _Row(moment, message.lower, message.point, message.upper, message.log_volume, message.gain, latency)
         self._rows[message.name].append(row)
         truth = self._truths.get(message.step)
         if truth is not None:
@@ -105,13 +106,15 @@ class Estimates:
         self._stream.send_columns(path("widths", peer), times, rr.Scalars.columns(scalars=widths))
         latencies = np.array([row.latency_ms for row in rows])
         self._stream.send_columns(path("latency", peer), times, rr.Scalars.columns(scalars=latencies))
-        self._send_volumes(peer, [row for row in rows if row.log_volume is not None])
+        self._send_known("log_volume", peer, [(row.moment, row.log_volume) for row in rows])
+        self._send_known("gain", peer, [(row.moment, row.gain) for row in rows])
 
-    def _send_volumes(self, peer: str, rows: list[_Row]) -> None:
-        if rows:
-            values = np.array([row.log_volume for row in rows])
-            times = self._timelines.columns([row.moment for row in rows])
-            self._stream.send_columns(path("log_volume", peer), times, rr.Scalars.columns(scalars=values))
+    def _send_known(self, what: str, peer: str, rows: list[tuple[Moment, float | None]]) -> None:
+        known = [(moment, value) for moment, value in rows if value is not None]
+        if known:
+            values = np.array([value for _, value in known])
+            times = self._timelines.columns([moment for moment, _ in known])
+            self._stream.send_columns(path(what, peer), times, rr.Scalars.columns(scalars=values))
 
     def _send_errors(self, peer: str, errors: list[_Error]) -> None:
         times = self._timelines.columns([error.moment for error in errors])
@@ -130,8 +133,8 @@ class Estimates:
         for peer, color in colors.items():
             shades = [_shade(color, i, len(labels)) for i in range(len(labels))]
             self._line(path("widths", peer), shades, [f"{peer} {label}" for label in labels])
-            self._line(path("log_volume", peer), [color], [peer])
-            self._line(path("latency", peer), [color], [peer])
+            for what in ("log_volume", "gain", "latency"):
+                self._line(path(what, peer), [color], [peer])
 
     def _line(self, entity: str, colors: list[Color], names: list[str]) -> None:
         self._stream.log(entity, rr.SeriesLines(colors=colors, widths=[1.5] * len(names), names=names), static=True)

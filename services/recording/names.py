@@ -8,6 +8,7 @@
 ``/errors/<state>/<peer>``             point − truth, lower − truth, upper − truth
 ``/widths/<peer>``                     widths of the interval hull, one series per state
 ``/log_volume/<peer>``                 natural logarithm of the volume
+``/gain/<peer>``                       gain of a step's Bayesian transfers, in nats
 ``/measured/<sensor>/<output>``        measured outputs
 ``/outputs/<sensor>/<output>/<peer>``  predicted interval of the output
 ``/space/sets/<peer>``                 set in three coordinates, ``…/edges`` its edges
@@ -30,6 +31,7 @@ import rerun as rr
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.settings import SensorSettings
+from lsu_mesh.mesh.messages import Measurement, Message, Posterior, Prediction, Truth
 
 
 def path(*parts: str) -> str:
@@ -80,6 +82,18 @@ class Names:
         listed = [output for sensor in configuration.sensors.values() for output in outputs_of(sensor)]
         object.__setattr__(self, "outputs", tuple(listed))
 
+    def check(self, message: Message) -> None:
+        """Raise ``ValueError`` where a message does not fit the mesh: it would spoil the batch of the others."""
+        states = len(self.states)
+        if isinstance(message, Truth):
+            _check_count("states", len(message.x), states)
+        elif isinstance(message, Posterior):
+            _check_count("states", len(message.lower), states)
+        elif isinstance(message, Measurement):
+            _check_count("outputs", len(message.y), len(self.configuration.sensors[message.name].C))
+        elif isinstance(message, Prediction):
+            _check_count("outputs", len(message.y_lower), len(self.outputs_of_filter(message.name)))
+
     def label(self, state: int) -> str:
         """Name of a state with its unit, such as ``position [m]``."""
         unit = self.configuration.base_model.units[state]
@@ -95,6 +109,11 @@ class Names:
         """Outputs in the order of a filter's rows of C: sensors by name, then rows."""
         chosen = self.configuration.filters[name].sensors
         return tuple(output for sensor in sorted(chosen) for output in self.outputs if output.sensor == sensor)
+
+
+def _check_count(what: str, found: int, expected: int) -> None:
+    if found != expected:
+        raise ValueError(f"{found} {what}, the configuration has {expected}")
 
 
 def outputs_of(sensor: SensorSettings) -> list[Output]:

@@ -41,7 +41,12 @@ HEALTH: Mapping[str, Color] = {
     "STALE": (150, 75, 255),
     "gone": ABSENT,
 }
-TRUST: Mapping[str, Color] = {"accepted": (0, 160, 80), "rejected": (230, 40, 40), "quarantined": (150, 75, 255)}
+TRUST: Mapping[str, Color] = {
+    "accepted": (0, 160, 80),
+    "rejected": (230, 40, 40),
+    "quarantined": (150, 75, 255),
+    "silent": ABSENT,
+}
 
 
 def colors(configuration: Configuration) -> dict[str, Color]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,7 +29,11 @@ def read_raw(path: Path, *, refused: bool = False) -> list[RawMessage]:
         raise FileNotFoundError(2, "no such recording", str(path))
     rows: list[tuple[int, RawMessage]] = []
     try:
-        for chunk in RrdReader(path).stream().filter(content="/raw/**"):
+        with warnings.catch_warnings():
+            # A recording that is still written, or whose writer was killed, has no footer.
+            warnings.filterwarnings("ignore", message="RRD file has no footer")
+            chunks = RrdReader(path).stream().filter(content="/raw/**")
+        for chunk in chunks:
             if refused or chunk.entity_path != REFUSED:
                 rows += _rows(chunk.to_record_batch())
     except (RuntimeError, OSError) as error:

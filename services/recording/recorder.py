@@ -58,7 +58,8 @@ class Recorder:
         run_properties: Mapping[str, str] = NOTHING,
         serve_port: int | None = None,
     ) -> None:
-        names, timelines = Names(configuration), Timelines(configuration.mesh.dt)
+        self._names = names = Names(configuration)
+        timelines = Timelines(configuration.mesh.dt)
         colors = palette.colors(configuration)
         self.path = path
         self.flushed: dict[str, int] = {}
@@ -132,6 +133,7 @@ class Recorder:
         self._guarded("closing the file", self._stream.disconnect)
 
     def _draw(self, message: Message, arrival_ns: int) -> None:
+        self._names.check(message)
         moment = Moment(message.step, arrival_ns)
         self._latest_step = max(self._latest_step, message.step)
         if isinstance(message, Posterior):

@@ -66,6 +66,7 @@ class Space:
         self._waiting: dict[int, list[_Set]] = {}
         self._newest_ns = 0
         self._drawn_steps: dict[int, None] = {}
+        self._failed: Exception | None = None
         self._shown: set[str] = set()
         self._estimators = set(names.estimators)
         self._points: list[tuple[Moment, list[float]]] = []
@@ -116,13 +117,20 @@ class Space:
         for peer, bodies in drawn.items():
             self._send(peer, bodies)
         self._send_points()
+        failed, self._failed = self._failed, None
         if steps:
             spent = (time.perf_counter_ns() - began) / len(steps)
             self._pause_ns = min(max(self._interval_ns, int(spent / SHARE)), LONGEST_PAUSE_NS)
+        if failed is not None:
+            raise failed
 
     def _draw_step(self, step: int, sets: list[_Set], drawn: defaultdict[str, list[_Drawn]]) -> None:
         for one in sorted(sets, key=lambda one: one.peer in self._fusions):  # the common frame sees fusions last
-            shape = self._body(one)
+            try:
+                shape = self._body(one)
+            except Exception as error:  # the other sets are drawn; the error is raised when they are
+                self._failed = error
+                shape = EMPTY
             drawn[one.peer].append(_Drawn(one.moment, shape))
             self._look(one, shape)
             self._shown.add(one.peer)
@@ -147,7 +155,8 @@ class Space:
         self._chosen[step] = Moment(step, arrival_ns)
         if len(self._chosen) > REMEMBERED:
             del self._chosen[next(iter(self._chosen))]
-        self._next_ns = max(self._next_ns, arrival_ns - self._pause_ns) + self._pause_ns
+        due = self._next_ns + self._pause_ns
+        self._next_ns = due if due > arrival_ns else arrival_ns + self._pause_ns
 
     def _look(self, one: _Set, shape: Body) -> None:
         """Let the frames follow: each peer's own, and the common one, which follows the fusion where there is one."""

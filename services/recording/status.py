@@ -22,6 +22,7 @@ class StatusLanes:
     def __init__(self, stream: rr.RecordingStream, timelines: Timelines, configuration: Configuration) -> None:
         self._stream = stream
         self._timelines = timelines
+        self._sources = {name: set(fusion.sources) for name, fusion in configuration.fusion.items()}
         self._shown: dict[str, str] = {}
         self._rows: defaultdict[str, list[tuple[Moment, str]]] = defaultdict(list)
         for name in (*configuration.filters, *configuration.fusion):
@@ -49,6 +50,8 @@ class StatusLanes:
             self._change(path("trust", message.name, source), moment, "rejected")
         for source in quarantined:
             self._change(path("trust", message.name, source), moment, "quarantined")
+        for source in self._sources[message.name] - accepted - rejected - quarantined:
+            self._change(path("trust", message.name, source), moment, "silent")
 
     def add_health(self, message: Health, moment: Moment) -> None:
         """Level of a peer's health."""
