@@ -160,3 +160,28 @@ def test_a_snapshot_brings_back_waiting_data() -> None:
 def test_wrong_options_are_named(options: dict[str, object], message: str) -> None:
     with pytest.raises(ModelError, match=message):
         ZonotopicKalman(MODEL, PRIOR, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("form", "order", "expected", "spread"), [("predictor", 15, 0.8, 0.25), ("filter", 15, 0.5, 0.15)]
+)
+def test_squared_error_of_state_2_in_p2018(form: str, order: int, expected: float, spread: float) -> None:
+    """Σ (x̂₂ − x₂)² over 100 steps of P3 with ρ = .1, r = .3, mean of ten runs; no state outside its bounds."""
+    model = LSUModel(A, MODEL.B, MODEL.C, rho=0.1, r=0.3)
+    sums = []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        x = rng.uniform(-1, 1, 3)
+        estimator = ZonotopicKalman(model, PRIOR, order, form)
+        total = 0.0
+        for _ in range(100):
+            estimator.update(model.C @ x + rng.uniform(-0.3, 0.3, 2))
+            total += float(estimator.point[1] - x[1]) ** 2
+            lower, upper = estimator.bounds()
+            assert (lower <= x).all()
+            assert (x <= upper).all()
+            u = rng.normal(size=1)
+            estimator.predict(u)
+            x = model.A @ x + model.B @ u + rng.uniform(-0.1, 0.1, 3)
+        sums.append(total)
+    assert abs(np.mean(sums) - expected) <= spread
