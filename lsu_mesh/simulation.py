@@ -112,8 +112,9 @@ def simulate(
 ) -> Simulation:
     """Simulate ``steps`` steps from x1 (n,), 0 by default.
 
-    ``inputs``: see :func:`input_at`, or an array (steps, p). ``noise``: ``"uniform"``, or ``"corners"`` for the extreme
-    values only. The stored numbers fulfil the declared bounds in exact arithmetic (see :func:`next_state` for the exceptions).
+    ``inputs``: see :func:`input_at`, or an array (steps, p). ``noise``: ``"uniform"``, or ``"corners"`` for the
+    extreme values only. The stored numbers fulfil the declared bounds in exact arithmetic (see :func:`next_state` for
+    the exceptions).
     """
     n, m, p, q = model.state_count, model.output_count, model.input_count, model.rho.size
     X, Y = np.empty((steps, n)), np.empty((steps, m))

@@ -43,8 +43,8 @@ class FilterBank:
     options:
         Options of the class, as ``time_update`` of LSUP.
 
-    Every instance gives the same bits as a filter of its own. An instance whose data contradict its bounds (or whose set
-    overflows) keeps the set that it had, and the others go on.
+    Every instance gives the same bits as a filter of its own. An instance whose data contradict its bounds (or whose
+    set overflows) keeps the set that it had, and the others go on.
     """
 
     def __init__(
@@ -92,7 +92,8 @@ class FilterBank:
     def update(self, Y: ArrayLike) -> Flags:
         """Data update with Y (N, m), NaN for missing; ``False`` marks an instance whose data contradict its set."""
         outputs = self._table("Y", Y, self._models.C.shape[1])[:, np.newaxis]
-        return self._sweep(outputs, self._no_inputs(1), updating=True, last_prediction=False)[1][:, 1] == loops.DONE
+        outcome = self._sweep(outputs, self._no_inputs(1), True, False)[1]
+        return np.equal(outcome[:, 1], loops.DONE)
 
     def predict(self, U: ArrayLike | None = None) -> Flags:
         """Time update with U (N, p); ``False`` marks an instance whose prediction misses its domain."""
@@ -101,10 +102,11 @@ class FilterBank:
             raise ModelError(f"the models have {p} input(s): give U of shape ({len(self)}, {p})")
         inputs = self._no_inputs(1) if U is None else self._table("U", U, p)[:, np.newaxis]
         outputs = np.zeros((len(self), 1, self._models.C.shape[1]))
-        return self._sweep(outputs, inputs, updating=False, last_prediction=True)[1][:, 1] == loops.DONE
+        outcome = self._sweep(outputs, inputs, False, True)[1]
+        return np.equal(outcome[:, 1], loops.DONE)
 
     def run(self, Y: ArrayLike, U: ArrayLike | None = None) -> tuple[FilterRun, NDArray[np.int64]]:
-        """All rows of Y (N, T, m) with the inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
+        """All rows of Y (N, T, m) with inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
 
         An instance with fewer rows done than T met a contradiction there; its further rows are NaN.
         """

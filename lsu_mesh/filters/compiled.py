@@ -18,6 +18,7 @@ from lsu_mesh.filters.arguments import (
     output_vector,
     same_states,
 )
+from lsu_mesh.filters.contradiction import strip_contradiction
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.kernels import loops, step
 from lsu_mesh.kernels.scratch import Scratch, scratch
@@ -32,8 +33,8 @@ Matrix = NDArray[np.float64]
 class CompiledFilter(Filter):
     """A filter whose steps are those of ``kernels/step.py`` for its ``family`` and ``option``.
 
-    The state is a matrix with rows of length n. It is never written again once it is in force, so that a snapshot is the
-    matrix itself.
+    The state is a matrix with rows of length n. It is never written again once it is in force, so that a snapshot is
+    the matrix itself.
     """
 
     family: ClassVar[int]
@@ -139,9 +140,10 @@ class CompiledFilter(Filter):
         return True
 
     def sweep(self, Y: Matrix, U: Matrix, record: loops.Record) -> tuple[int, int]:
-        """Update and predict for all rows of Y (T, m), U (T, p) in one compiled loop; ``record`` with a leading axis 1.
+        """Update and predict for all rows of Y (T, m), U (T, p) in a compiled loop; ``record`` has a leading axis 1.
 
-        Returns the rows that are done, and where it stopped (``kernels/loops.py``); the filter holds the last good state.
+        Returns the rows that are done, and where it stopped (``kernels/loops.py``); the filter holds the last good
+        state.
         """
         a = self._arrays
         domain = self._model.domain
@@ -201,17 +203,11 @@ class CompiledFilter(Filter):
         self._state = state
 
     def _contradiction(self, y: Vector, r: Vector, status: int) -> InconsistentData:
-        """Name the strips that alone miss the set, else all strips up to the one that proved the contradiction."""
+        """Names the strips up to the one that proved the contradiction."""
         interval = self._predict_output(r)
-        gaps = np.fmax(interval.lower - y, y - interval.upper)
-        alone = [int(k) for k in np.flatnonzero(gaps > 0)]
-        names = self._model.outputs
-        if alone:
-            listed = ", ".join(f"{names[k]} (by {gaps[k]:.3g})" for k in alone)
-            return InconsistentData(f"outside its predicted interval: {listed}", alone, float(gaps[alone[0]]))
-        rows = [k for k in range(status) if not math.isnan(y[k])]
-        listed = ", ".join(names[k] for k in rows)
-        return InconsistentData(f"the strips of {listed} and the prediction have no point in common", rows)
+        return strip_contradiction(
+            self._model.outputs[:status], interval.lower[:status], interval.upper[:status], y[:status], np.zeros(status)
+        )
 
 
 def faces(support: Support) -> list[tuple[Matrix, Vector, Vector]]:

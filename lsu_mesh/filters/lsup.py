@@ -42,9 +42,9 @@ class LSUP(CompiledFilter):
     prior:
         A set that holds x_1: a parallelotope or a box is used as it is, of other sets the interval hull.
     time_update:
-        ``"image"``: edges along A T, which reproduces the papers; ``"cgz"``: noise generators take the place of edges, one
-        at a time, where that leaves less volume; ``"edges"``: the best n of all edges, n ≤ 6; ``"strips"``: the image,
-        then the faces of the circumscribed box as strips.
+        ``"image"``: edges along A T, which reproduces the papers; ``"cgz"``: noise generators take the place of edges,
+        one at a time, where that leaves less volume; ``"edges"``: the best n of all edges, n ≤ 6; ``"strips"``: the
+        image, then the faces of the circumscribed box as strips.
 
     Raises ``ModelError`` on options or a prior that do not fit.
     Source: Lainová et al. 2019, section 3.2; Vicino & Zappa 1996; Chisci, Garulli & Zappa 1996.

@@ -21,20 +21,20 @@ Matrix = NDArray[np.float64]
 class LSUPB(CompiledFilter):
     """Bundle filter: a parallelotope and a box, both of which hold the state; the recommended default.
 
-    Data strips go to both; the faces of the box are offered to the parallelotope as strips, the box is met with the hull of
-    the parallelotope and with its faces. :attr:`support` is the intersection of both, :meth:`bounds` the box, :attr:`point`
-    its centre, and :meth:`volume` the smaller of both volumes, an upper bound of the intersection's.
+    Data strips go to both; the faces of the box are offered to the parallelotope as strips, the box is met with the
+    hull of the parallelotope and with its faces. :attr:`support` is the intersection of both, :meth:`bounds` the box,
+    :attr:`point` its centre, and :meth:`volume` the smaller of both volumes, an upper bound of the intersection's.
 
     Parameters
     ----------
     model:
         The system; n states, m outputs.
     prior:
-        A set that holds x_1. A parallelotope (or an intersection with one as a part) is used as it is, with its interval
-        hull as the box; of other sets the interval hull.
+        A set that holds x_1. A parallelotope (or an intersection with one as a part) is used as it is, with its
+        interval hull as the box; of other sets the interval hull.
 
-    The two faults of a parallelotope alone, elongation over time and a hull wider than the data allow, go back to Lainová
-    et al. 2019, section 3.2; the bundle is this library's own.
+    It cures the two faults of a parallelotope alone, elongation over time and a hull wider than the data allow. The
+    parallelotope is that of Lainová et al. 2019, section 3.2; the bundle is this library's own.
     """
 
     kind: ClassVar[str] = "LSUPB"

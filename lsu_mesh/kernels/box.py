@@ -7,16 +7,17 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.borrow import block
+from lsu_mesh.kernels.compile import inlined, inner, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
-from lsu_mesh.kernels.scratch import BODY, BOX, DELTA, STRIP, Scratch
+from lsu_mesh.kernels.scratch import BODY, BOX, DELTA, STRIP, Scratch, row, square
 from lsu_mesh.kernels.strip import EMPTY, OVERFLOW, STRIP_ROWS, TIGHTENED, UNCHANGED, cut, half_width, hull, middle
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
 
-@kernel
+@inlined
 def predict(
     lower: Vector, upper: Vector, A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector,
     new_lower: Vector, new_upper: Vector, work: Scratch,
@@ -27,7 +28,7 @@ def predict(
     Returns 0 or ``OVERFLOW``.
     """
     n, p, k = lower.size, u.size, widths.size
-    c, q = work.vectors[BOX], work.vectors[BOX + 1]
+    c, q = row(work, n, BOX), row(work, n, BOX + 1)
     for j in range(n):
         c[j] = middle(lower[j], upper[j])
         q[j] = half_width(lower[j], upper[j], c[j])
@@ -56,7 +57,7 @@ def predict(
     return 0 if finite else OVERFLOW
 
 
-@kernel
+@inlined
 def update(
     lower: Vector, upper: Vector, C: Matrix, y: Vector, r: Vector, meet: bool,
     new_lower: Vector, new_upper: Vector, work: Scratch,
@@ -67,8 +68,8 @@ def update(
     Jirsa 2018, eqs. 11–13). Returns 0, ``OVERFLOW``, or k + 1 where the strip of row k is proved to miss the set.
     """
     n = lower.size
-    c, delta, T = work.vectors[BOX], work.vectors[DELTA], work.squares[BODY]
-    strips = work.vectors[STRIP : STRIP + STRIP_ROWS]
+    c, delta, T = row(work, n, BOX), row(work, n, DELTA), square(work, n, BODY)
+    strips = block(work, STRIP * n, STRIP_ROWS, n)
     for i in range(n):
         new_lower[i], new_upper[i] = lower[i], upper[i]
         delta[i] = 0.0
@@ -86,7 +87,7 @@ def update(
             last = k + 1
     if not touched:
         return 0
-    hull_lower, hull_upper = work.vectors[BOX + 1], work.vectors[BOX + 2]
+    hull_lower, hull_upper = row(work, n, BOX + 1), row(work, n, BOX + 2)
     if not hull(c, T, delta, hull_lower, hull_upper):
         return 0 if meet else OVERFLOW
     for i in range(n):
@@ -146,7 +147,7 @@ def volume(lower: Vector, upper: Vector) -> float:
     return product
 
 
-@kernel
+@inner
 def predict_output(
     lower: Vector, upper: Vector, C: Matrix, r: Vector, y_lower: Vector, y_upper: Vector, y_point: Vector
 ) -> None:

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.box import tighten
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.compile import inlined, inner
 from lsu_mesh.kernels.parallelotope import cut_all, faces
 from lsu_mesh.kernels.rounding import down, up
-from lsu_mesh.kernels.scratch import BODY, BUNDLE, FACTOR, IDENTITY, Scratch
+from lsu_mesh.kernels.scratch import BODY, BUNDLE, FACTOR, IDENTITY, Scratch, row, square
 from lsu_mesh.kernels.strip import EMPTY, OVERFLOW, hull
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
 
-@kernel
+@inner
 def tighten_each_other(c: Vector, T: Matrix, lower: Vector, upper: Vector, work: Scratch) -> int:
     """Faces of the box to the parallelotope, then its hull and its faces to the box; in place.
 
@@ -31,11 +31,11 @@ def tighten_each_other(c: Vector, T: Matrix, lower: Vector, upper: Vector, work:
     """
     n = c.size
     interval = n > 0  # always; a literal would compile cut_all a second time
-    status = cut_all(c, T, work.squares[IDENTITY], lower, upper, interval, work)
+    status = cut_all(c, T, square(work, n, IDENTITY), lower, upper, interval, work)
     if status != 0:
         return status
-    hull_lower, hull_upper = work.vectors[BUNDLE], work.vectors[BUNDLE + 1]
-    no_error = work.vectors[BUNDLE + 2]
+    hull_lower, hull_upper = row(work, n, BUNDLE), row(work, n, BUNDLE + 1)
+    no_error = row(work, n, BUNDLE + 2)
     for i in range(n):
         no_error[i] = 0.0
     if not hull(c, T, no_error, hull_lower, hull_upper):
@@ -43,8 +43,8 @@ def tighten_each_other(c: Vector, T: Matrix, lower: Vector, upper: Vector, work:
     status = shrink(lower, upper, hull_lower, hull_upper)
     if status != 0:
         return status
-    P, middle, reach = work.squares[BODY], work.vectors[BUNDLE], work.vectors[BUNDLE + 1]
-    if faces(c, T, P, middle, reach, work.squares[FACTOR]):
+    P, middle, reach = square(work, n, BODY), row(work, n, BUNDLE), row(work, n, BUNDLE + 1)
+    if faces(c, T, P, middle, reach, square(work, n, FACTOR)):
         return tighten_all(lower, upper, P, middle, reach)
     return 0
 
@@ -61,7 +61,7 @@ def tighten_all(lower: Vector, upper: Vector, P: Matrix, y: Vector, r: Vector) -
     return 0
 
 
-@inner
+@inlined
 def shrink(lower: Vector, upper: Vector, other_lower: Vector, other_upper: Vector) -> int:
     """Meet with a box, exact and in place; returns 0, or i + 1 where coordinate i leaves nothing."""
     status = 0

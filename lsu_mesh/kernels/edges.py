@@ -14,24 +14,36 @@ from numpy.typing import NDArray
 from lsu_mesh.kernels.compile import inner
 from lsu_mesh.kernels.linear_algebra import invert, log_abs_determinant
 from lsu_mesh.kernels.rounding import EPSILON, up
-from lsu_mesh.kernels.scratch import BASIS, BEST, CANDIDATES, CHOSEN, ENCLOSE, FACTOR, INVERSE, Scratch
+from lsu_mesh.kernels.scratch import (
+    BASIS,
+    BEST,
+    CHOSEN,
+    ENCLOSE,
+    FACTOR,
+    INVERSE,
+    Scratch,
+    candidates_of,
+    row,
+    square,
+    weights_of,
+)
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @inner
 def choose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, exhaustive: bool, work: Scratch) -> None:
     """Edges that leave little volume: greedy swaps, or ``exhaustive`` the best n of all candidates.
 
-    Afterwards T holds the chosen edges; page ``CANDIDATES`` and ``weights`` (of length n + q) of the scratch hold the
-    other generators of ``T ⊕ G diag(widths)``; the rounding of the products went to delta.
+    Afterwards T holds the chosen edges; ``candidates_of`` and ``weights_of`` the scratch are the other generators of
+    ``T ⊕ G diag(widths)``; the rounding of the products went to delta.
     Source: Chisci, Garulli & Zappa 1996, theorem 1.
     """
     n, count = T.shape[0], T.shape[0] + widths.size
-    candidates, chosen = work.pages[CANDIDATES], work.picks[CHOSEN]
-    edges, inverse, factor = work.squares[BASIS], work.squares[INVERSE], work.squares[FACTOR]
+    candidates, weights = candidates_of(work, n, widths.size), weights_of(work, n, widths.size)
+    chosen, best = row(work, n, CHOSEN), row(work, n, BEST)
+    edges, inverse, factor = square(work, n, BASIS), square(work, n, INVERSE), square(work, n, FACTOR)
     for i in range(n):
         chosen[i] = i
         rounded = 0.0
@@ -42,21 +54,21 @@ def choose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, exhaustive: bool
             rounded += abs(candidates[i, n + j])
         delta[i] = up(delta[i] + EPSILON * rounded)
     if exhaustive:
-        _find_best(candidates, count, chosen, work.picks[BEST], edges, inverse, factor)
+        _find_best(candidates, count, chosen, best, edges, inverse, factor)
     else:
         for q in range(n, count):
             if widths[q - n] > 0.0 and invert(edges, inverse, factor):
-                _swap(edges, inverse, candidates, q, work.vectors[ENCLOSE], chosen)
+                _swap(edges, inverse, candidates, q, row(work, n, ENCLOSE), chosen)
     for q in range(count):
-        work.weights[q] = 1.0
+        weights[q] = 1.0
     for j in range(n):
-        work.weights[chosen[j]] = 0.0
+        weights[int(chosen[j])] = 0.0
         for i in range(n):
-            T[i, j] = candidates[i, chosen[j]]
+            T[i, j] = candidates[i, int(chosen[j])]
 
 
 @inner
-def _swap(edges: Matrix, inverse: Matrix, candidates: Matrix, q: int, alpha: Vector, chosen: Indices) -> None:
+def _swap(edges: Matrix, inverse: Matrix, candidates: Matrix, q: int, alpha: Vector, chosen: Vector) -> None:
     """Enclose ``edges ⊕ candidate q``: all edges grow by ``1 + |α_j|``, ``α = edges⁻¹ g``, or g replaces edge k."""
     n = alpha.size
     least = 0.0
@@ -88,7 +100,7 @@ def _swap(edges: Matrix, inverse: Matrix, candidates: Matrix, q: int, alpha: Vec
 
 @inner
 def _find_best(
-    candidates: Matrix, count: int, chosen: Indices, best: Indices, edges: Matrix, inverse: Matrix, factor: Matrix
+    candidates: Matrix, count: int, chosen: Vector, best: Vector, edges: Matrix, inverse: Matrix, factor: Matrix
 ) -> None:
     """The combination ``chosen`` of the first ``count`` candidates that leaves the least volume; starts from itself."""
     n = chosen.size
@@ -99,7 +111,7 @@ def _find_best(
     while searching:
         for j in range(n):
             for i in range(n):
-                edges[i, j] = candidates[i, chosen[j]]
+                edges[i, j] = candidates[i, int(chosen[j])]
         volume = _log_volume_along(edges, candidates, count, inverse, factor)
         if volume < least:
             least = volume
@@ -129,7 +141,7 @@ def _log_volume_along(edges: Matrix, candidates: Matrix, count: int, inverse: Ma
 
 
 @inner
-def _next_combination(chosen: Indices, count: int) -> bool:
+def _next_combination(chosen: Vector, count: int) -> bool:
     """The next n of ``count`` indices in lexicographic order; ``False`` after the last."""
     n = chosen.size
     j = n - 1

@@ -14,10 +14,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.compile import inlined, inner, kernel
 from lsu_mesh.kernels.linear_algebra import invert, orthogonal_basis
 from lsu_mesh.kernels.rounding import UNDERFLOW, UNIT_ROUNDOFF, gamma, up
-from lsu_mesh.kernels.scratch import BASIS, COLUMNS, ENCLOSE, FACTOR, INVERSE, Scratch
+from lsu_mesh.kernels.scratch import BASIS, ENCLOSE, FACTOR, INVERSE, Scratch, columns_of, row, square
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
@@ -39,9 +39,9 @@ def enclose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) 
 def enclose_along_edges(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
     """As :func:`enclose`, edges keep their directions; ``False``, T untouched, where T is numerically singular."""
     n = T.shape[0]
-    inverse = work.squares[INVERSE]
-    grown, own = work.vectors[ENCLOSE], work.vectors[ENCLOSE + 1]
-    if not invert(T, inverse, work.squares[FACTOR]):
+    inverse = square(work, n, INVERSE)
+    grown, own = row(work, n, ENCLOSE), row(work, n, ENCLOSE + 1)
+    if not invert(T, inverse, square(work, n, FACTOR)):
         return False
     for i in range(n):
         grown[i] = _noise_reach(inverse, i, G, widths, delta)
@@ -53,8 +53,8 @@ def enclose_along_edges(T: Matrix, G: Matrix, widths: Vector, delta: Vector, wor
 def enclose_orthogonally(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
     """As :func:`enclose`, with new edges: an orthogonal basis, the longest columns first, in row-scaled coordinates."""
     n, q = T.shape[0], widths.size
-    basis, inverse, columns = work.squares[BASIS], work.squares[INVERSE], work.pages[COLUMNS]
-    grown, own, scale = work.vectors[ENCLOSE], work.vectors[ENCLOSE + 1], work.vectors[ENCLOSE + 2]
+    basis, inverse, columns = square(work, n, BASIS), square(work, n, INVERSE), columns_of(work, n, n + q)
+    grown, own, scale = row(work, n, ENCLOSE), row(work, n, ENCLOSE + 1), row(work, n, ENCLOSE + 2)
     for i in range(n):
         size = delta[i]
         for j in range(n):
@@ -81,13 +81,13 @@ def enclose_orthogonally(T: Matrix, G: Matrix, widths: Vector, delta: Vector, wo
     return _grow(basis, inverse, grown, own, work, T)
 
 
-@inner
+@inlined
 def inflate(x: float, operations: int) -> float:
     """x ≥ 0 rounded up by the relative error of as many operations on non-negative numbers; 0 stays 0."""
     return x + gamma(operations) * x + UNDERFLOW if x > 0.0 else 0.0
 
 
-@inner
+@inlined
 def residual_row(M: Matrix, V: Matrix, i: int) -> float:
     """``Σ_j |I − M V|_ij``, rounded up."""
     n = V.shape[0]
@@ -110,7 +110,7 @@ def _power_of_two(size: float) -> float:
     return math.ldexp(0.5, math.frexp(size)[1])
 
 
-@inner
+@inlined
 def _noise_reach(M: Matrix, i: int, G: Matrix, widths: Vector, delta: Vector) -> float:
     """``Σ_q |(M G)_iq| widths_q + (|M| delta)_i``, rounded up."""
     n, q = M.shape[0], widths.size
@@ -151,8 +151,8 @@ def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Ma
     The rounding of the products is enclosed as well. ``False``, T untouched, where ``M ≈ V⁻¹`` is not good enough.
     """
     n = V.shape[0]
-    residual, first = work.vectors[ENCLOSE + 3], work.vectors[ENCLOSE + 4]
-    lost, final = work.vectors[ENCLOSE + 5], work.vectors[ENCLOSE + 6]
+    residual, first = row(work, n, ENCLOSE + 3), row(work, n, ENCLOSE + 4)
+    lost, final = row(work, n, ENCLOSE + 5), row(work, n, ENCLOSE + 6)
     largest = 0.0
     for i in range(n):
         residual[i] = residual_row(M, V, i)
@@ -182,11 +182,11 @@ def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Ma
     return True
 
 
-@inner
+@inlined
 def _solve_bound(b: Vector, residual: Vector, largest: float, z: Vector) -> None:
     """``z_i = b_i + ρ_i max(b)/(1 − max(ρ))``, rounded up."""
     greatest = 0.0
     for i in range(b.size):
         greatest = max(greatest, b[i])
     for i in range(b.size):
-        z[i] = inflate(b[i] + residual[i] * greatest / (1.0 - largest), 8)
+        z[i] = inflate(b[i] + residual[i] * greatest / (1.0 - largest), b.size + 6)

@@ -59,7 +59,7 @@ def invert(T: Matrix, inverse: Matrix, factor: Matrix) -> bool:
     return True
 
 
-@kernel
+@inner
 def orthogonal_basis(columns: Matrix, count: int, basis: Matrix) -> None:
     """Nearly orthonormal ``basis`` (n, n) along the longest of the first columns, completed by coordinate axes.
 
@@ -122,12 +122,6 @@ def _complete(basis: Matrix, d: int) -> None:
     for i in range(n):
         basis[i, d] = 1.0 if i == axis else 0.0
     _orthonormalise(basis, d)
-
-
-@kernel
-def abs_determinant(T: Matrix, factor: Matrix) -> float:
-    """``|det T|``; ``factor`` is scratch."""
-    return math.exp(log_abs_determinant(T, factor))
 
 
 @kernel

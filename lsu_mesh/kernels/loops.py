@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
-from lsu_mesh.kernels.scratch import Scratch
+from lsu_mesh.kernels.borrow import borrowed
+from lsu_mesh.kernels.compile import inlined, kernel
+from lsu_mesh.kernels.scratch import Scratch, spare_state
 from lsu_mesh.kernels.step import MEET_BOX, PREDICT, UPDATE, advance, copy, describe, predict_output
 
 Matrix = NDArray[np.float64]
@@ -54,47 +55,68 @@ def sweep(
 ) -> None:  # fmt: skip
     """Rows 1 … T of the instances first … last − 1, whose states (N, rows, n) go from the prior to the last one.
 
-    Each row: predict the output, update with ``Y[i, k]``, record (all three only where ``updating``); then, but after the
-    last row only with ``last_prediction``, predict with ``U[i, k]``. ``outcome`` (N, 2): the rows that are done, and
-    ``DONE`` or where it stopped: ``IN_UPDATE`` (the state is the prediction of that row) or ``IN_PREDICT`` (the state is the
-    posterior of the row before). Y (N, T, m), U (N, T, p); spare (rows, n) and work are scratch.
+    Each row: predict the output, update with ``Y[i, k]``, record (all three only where ``updating``); then, but after
+    the last row only with ``last_prediction``, predict with ``U[i, k]``. ``outcome`` (N, 2): the rows that are done,
+    and ``DONE`` or where it stopped: ``IN_UPDATE`` (the state is the prediction of that row) or ``IN_PREDICT`` (the
+    state is the posterior of the row before). Y (N, T, m), U (N, T, p); spare (rows, n) and work are scratch.
     """
     rows = Y.shape[1]
+    models, record, work = _borrow_models(models), _borrow_record(record), borrowed(work)
+    states, spare, Y, U = borrowed(states), borrowed(spare), borrowed(Y), borrowed(U)
+    bounded = models.domains.shape[1] > 0
     for i in range(first, last):
         j = i % models.A.shape[0]
-        C, r, S = models.C[j], models.r[j], states[i]
+        A, B, C, G = models.A[j], models.B[j], models.C[j], models.G[j]
+        widths, r, S = models.widths[j], models.r[j], states[i]
+        met = spare_state(work, S.shape[1], S.shape[0])
         outcome[i, 0], outcome[i, 1] = rows, DONE
-        for k in range(rows):
-            if updating:
+        # three actions a row through one call of advance: each further call would double the time of compiling
+        for turn in range(3 * rows):
+            k, action = turn // 3, turn % 3
+            after_last = k + 1 == rows and not last_prediction
+            if (action == UPDATE and not updating) or (action != UPDATE and after_last):
+                continue
+            source, target, low, high = S, spare, Y[i, k], r
+            if action == UPDATE:
                 predict_output(family, S, C, r, record.y_lower[i, k], record.y_upper[i, k], record.y_points[i, k], work)
-                if not _step(UPDATE, family, option, S, spare, models, j, Y[i, k], U[i, k], work):
-                    outcome[i, 0], outcome[i, 1] = k, IN_UPDATE
-                    break
+            elif action == MEET_BOX:
+                if not bounded:
+                    continue
+                source, target, low, high = spare, met, models.domains[j, 0], models.domains[j, 1]
+            status = advance(action, family, option, source, C, low, high, A, B, U[i, k], G, widths, target, work)
+            if status != 0:
+                outcome[i, 0] = k if action == UPDATE else k + 1
+                outcome[i, 1] = IN_UPDATE if action == UPDATE else IN_PREDICT
+                break
+            if action != PREDICT or not bounded:
+                copy(target, S)
+            if action == UPDATE:
                 record.volumes[i, k] = describe(
                     family, S, record.points[i, k], record.lower[i, k], record.upper[i, k], work
                 )
-            if (k + 1 < rows or last_prediction) and not _step(
-                PREDICT, family, option, S, spare, models, j, Y[i, k], U[i, k], work
-            ):
-                outcome[i, 0], outcome[i, 1] = k + 1, IN_PREDICT
-                break
 
 
-@inner
-def _step(
-    action: int, family: int, option: int, S: Matrix, spare: Matrix, models: Models, j: int,
-    y: Vector, u: Vector, work: Scratch,
-) -> bool:  # fmt: skip
-    """One action in place; a prediction is met with the domain. ``False``, S kept, where the status is not 0."""
-    A, B, C, G, widths, r = models.A[j], models.B[j], models.C[j], models.G[j], models.widths[j], models.r[j]
-    if advance(action, family, option, S, C, y, r, A, B, u, G, widths, spare, work) != 0:
-        return False
-    if action != PREDICT or models.domains.shape[1] == 0:
-        copy(spare, S)
-        return True
-    met = work.state[0 : S.shape[0]]
-    lower, upper = models.domains[j, 0], models.domains[j, 1]
-    if advance(MEET_BOX, family, option, spare, C, lower, upper, A, B, u, G, widths, met, work) != 0:
-        return False
-    copy(met, S)
-    return True
+@inlined
+def _borrow_models(m: Models) -> Models:
+    return Models(
+        borrowed(m.A),
+        borrowed(m.B),
+        borrowed(m.C),
+        borrowed(m.G),
+        borrowed(m.widths),
+        borrowed(m.r),
+        borrowed(m.domains),
+    )
+
+
+@inlined
+def _borrow_record(r: Record) -> Record:
+    return Record(
+        borrowed(r.points),
+        borrowed(r.lower),
+        borrowed(r.upper),
+        borrowed(r.volumes),
+        borrowed(r.y_lower),
+        borrowed(r.y_upper),
+        borrowed(r.y_points),
+    )

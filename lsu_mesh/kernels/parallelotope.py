@@ -7,12 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.borrow import block
+from lsu_mesh.kernels.compile import inlined, inner, kernel
 from lsu_mesh.kernels.edges import choose
 from lsu_mesh.kernels.enclosure import LARGEST_RESIDUAL, enclose, inflate, residual_row
 from lsu_mesh.kernels.linear_algebra import invert
 from lsu_mesh.kernels.rounding import down, gamma, up
-from lsu_mesh.kernels.scratch import BUNDLE, CANDIDATES, DELTA, STRIP, Scratch
+from lsu_mesh.kernels.scratch import BUNDLE, DELTA, STRIP, Scratch, candidates_of, row, weights_of
 from lsu_mesh.kernels.strip import EMPTY, OVERFLOW, STRIP_ROWS, UNCHANGED, cut
 
 Matrix = NDArray[np.float64]
@@ -25,29 +26,29 @@ STRIPS = 3
 """Time updates of LSUP."""
 
 
-@kernel
+@inlined
 def predict(
     c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector, time_update: int,
     new_c: Vector, new_T: Matrix, work: Scratch,
 ) -> int:  # fmt: skip
     """Time update: a parallelotope around the zonotope ``A P + B u ⊕ G diag(widths)[−1,1]^q``.
 
-    c (n,), T (n, n), A (n, n), B (n, p), u (p,), G (n, q), widths (q,). ``IMAGE``: edges along A T (Lainová et al. 2019,
-    eq. 36); ``CGZ``: greedy swaps of edges (Chisci, Garulli & Zappa 1996); ``EDGES``: the best n of all edges;
+    c (n,), T (n, n), A (n, n), B (n, p), u (p,), G (n, q), widths (q,). ``IMAGE``: edges along A T (Lainová et al.
+    2019, eq. 36); ``CGZ``: greedy swaps of edges (Chisci, Garulli & Zappa 1996); ``EDGES``: the best n of all edges;
     ``STRIPS``: the image; the caller then offers the faces of the box that circumscribes the zonotope, left in rows
     ``BUNDLE`` and ``BUNDLE + 1`` of the scratch vectors. Returns 0 or ``OVERFLOW``.
     """
-    delta = work.vectors[DELTA]
+    delta = row(work, c.size, DELTA)
     image(c, T, A, B, u, new_c, new_T, delta)
-    zonotope_hull(new_c, new_T, G, widths, delta, work.vectors[BUNDLE], work.vectors[BUNDLE + 1])
+    zonotope_hull(new_c, new_T, G, widths, delta, row(work, c.size, BUNDLE), row(work, c.size, BUNDLE + 1))
     columns, weights = G, widths
-    if time_update == CGZ or time_update == EDGES:
+    if time_update in (CGZ, EDGES):
         choose(new_T, G, widths, delta, time_update == EDGES, work)
-        columns, weights = work.pages[CANDIDATES], work.weights[0 : c.size + widths.size]
+        columns, weights = candidates_of(work, c.size, widths.size), weights_of(work, c.size, widths.size)
     return 0 if enclose(new_T, columns, weights, delta, work) else OVERFLOW
 
 
-@inner
+@inlined
 def zonotope_hull(c: Vector, T: Matrix, G: Matrix, widths: Vector, delta: Vector, lower: Vector, upper: Vector) -> None:
     """Interval hull ``c ± (Σ_j |T_j| + |G| widths + delta)``, rounded outward."""
     n, q = c.size, widths.size
@@ -61,7 +62,7 @@ def zonotope_hull(c: Vector, T: Matrix, G: Matrix, widths: Vector, delta: Vector
         lower[i], upper[i] = down(c[i] - reach), up(c[i] + reach)
 
 
-@kernel
+@inlined
 def image(c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, new_c: Vector, new_T: Matrix, delta: Vector) -> None:
     """``new_c ≈ A c + B u``, ``new_T ≈ A T``; ``delta`` (n,) bounds what rounding has lost in both together."""
     n, p = c.size, u.size
@@ -87,15 +88,16 @@ def image(c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, new_c: Vector, 
         delta[i] = inflate(gamma(n + p + 2) * magnitude, n * n + n + p + 4)
 
 
-@kernel
+@inner
 def cut_all(c: Vector, T: Matrix, P: Matrix, first: Vector, second: Vector, interval: bool, work: Scratch) -> int:
     """Cut by strips in the order of the rows of P (m, n), in place (the set is spoilt where the status is not 0).
 
-    The strips are ``first ≤ P x ≤ second`` where ``interval``, else ``|first − P x| ≤ second``; NaN is no strip. Returns 0,
-    ``OVERFLOW``, or k + 1 where the strip of row k is proved to miss the set. Source: Lainová et al. 2019, eq. (33).
+    The strips are ``first ≤ P x ≤ second`` where ``interval``, else ``|first − P x| ≤ second``; NaN is no strip.
+    Returns 0, ``OVERFLOW``, or k + 1 where the strip of row k is proved to miss the set. Source: Lainová et al. 2019,
+    eq. (33).
     """
-    delta = work.vectors[DELTA]
-    strips = work.vectors[STRIP : STRIP + STRIP_ROWS]
+    delta = row(work, c.size, DELTA)
+    strips = block(work, STRIP * c.size, STRIP_ROWS, c.size)
     touched = False
     for i in range(c.size):
         delta[i] = 0.0
@@ -132,7 +134,7 @@ def faces(c: Vector, T: Matrix, P: Matrix, y: Vector, r: Vector, factor: Matrix)
     return True
 
 
-@kernel
+@inner
 def predict_output(c: Vector, T: Matrix, C: Matrix, r: Vector, lower: Vector, upper: Vector, point: Vector) -> None:
     """Output interval ``C c ± (r + Σ_i |C T_i|)``, rounded outward (Lainová et al. 2019, eqs. 43–45, errata)."""
     n = c.size

@@ -1,7 +1,7 @@
 """One step of each family of filters: the single place where single step, loop and bank come together.
 
-A state is a matrix with rows of length n: ``BOX`` lower, upper; ``PARALLELOTOPE`` c, then the n rows of T; ``BUNDLE`` c, the
-n rows of T, lower, upper. ``option`` is, for ``BOX``, whether the hull is met with the prediction, and for
+A state is a matrix with rows of length n: ``BOX`` lower, upper; ``PARALLELOTOPE`` c, then the n rows of T; ``BUNDLE``
+c, the n rows of T, lower, upper. ``option`` is, for ``BOX``, whether the hull is met with the prediction, and for
 ``PARALLELOTOPE`` the kind of time update (``kernels/parallelotope.py``). All families and actions share one compiled
 function: each further one would compile everything below it once more.
 """
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels import box, parallelotope
 from lsu_mesh.kernels.bundle import shrink, tighten_all, tighten_each_other
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.compile import inlined, kernel
 from lsu_mesh.kernels.linear_algebra import log_abs_determinant
 from lsu_mesh.kernels.parallelotope import STRIPS, cut_all
 from lsu_mesh.kernels.scratch import BUNDLE as BUNDLE_ROW
-from lsu_mesh.kernels.scratch import FACTOR, IDENTITY, Scratch
+from lsu_mesh.kernels.scratch import FACTOR, IDENTITY, Scratch, row, square
 from lsu_mesh.kernels.strip import hull, middle
 
 Matrix = NDArray[np.float64]
@@ -30,8 +30,9 @@ PARALLELOTOPE = 1
 BUNDLE = 2
 
 UPDATE = 0
-MEET_BOX = 1
-PREDICT = 2
+PREDICT = 1
+MEET_BOX = 2
+"""Actions, in the order of a step; the last one after a prediction, where the model has a domain."""
 
 LOG_2 = math.log(2.0)
 
@@ -52,9 +53,9 @@ def advance(
 ) -> int:  # fmt: skip
     """``new`` ← S after one action; S is kept, ``new`` is spoilt where the status is not 0.
 
-    ``UPDATE``: ``S ∩ {|first − P x| ≤ second}``, rows in order, NaN is no strip. ``MEET_BOX``: ``S ∩ [first, second]``.
-    ``PREDICT``: ``A S + B u ⊕ G diag(widths)[−1,1]^q``. What an action does not need is not read. Returns 0, negative on
-    overflow, or k + 1 where the strip of row (the face of coordinate) k is proved to leave nothing.
+    ``UPDATE``: ``S ∩ {|first − P x| ≤ second}``, rows in order, NaN is no strip. ``MEET_BOX``: ``S ∩ [first,
+    second]``. ``PREDICT``: ``A S + B u ⊕ G diag(widths)[−1,1]^q``. What an action does not need is not read. Returns
+    0, negative on overflow, or k + 1 where the strip of row (the face of coordinate) k is proved to leave nothing.
     """
     n = S.shape[1]
     box_row = 0 if family == BOX else n + 1
@@ -69,13 +70,13 @@ def advance(
     c, T = new[0], new[1 : n + 1]
     rows, low, high, interval = P, first, second, action != UPDATE
     if interval:
-        rows = work.squares[IDENTITY]
+        rows = square(work, n, IDENTITY)
     if action == PREDICT:
         time_update = option if family == PARALLELOTOPE else STRIPS
         status = _predict_parallelotope(S[0], S[1 : n + 1], A, B, u, G, widths, time_update, c, T, work)
         if status != 0 or time_update != STRIPS:
             return status
-        low, high = work.vectors[BUNDLE_ROW], work.vectors[BUNDLE_ROW + 1]
+        low, high = row(work, n, BUNDLE_ROW), row(work, n, BUNDLE_ROW + 1)
         if family == BUNDLE:  # the hull of the image is exact: tighter than the hull of what encloses it
             status = shrink(new[n + 1], new[n + 2], low, high)
     else:
@@ -87,7 +88,7 @@ def advance(
     return tighten_each_other(c, T, new[n + 1], new[n + 2], work)
 
 
-@inner
+@inlined
 def _advance_box(
     action: int, option: int, in_bundle: bool, S: Matrix, P: Matrix, first: Vector, second: Vector,
     A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector, new: Matrix, work: Scratch,
@@ -103,7 +104,7 @@ def _advance_box(
     return shrink(new[0], new[1], first, second)
 
 
-@inner
+@inlined
 def copy(source: Matrix, target: Matrix) -> None:
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
@@ -121,9 +122,12 @@ def predict_output(
         return
     _output_of_parallelotope(S[0], S[1 : n + 1], C, r, lower, upper, point)
     if family == BUNDLE:
-        rest = work.vectors[BUNDLE_ROW]
         for k in range(C.shape[0]):
-            low, high, mid = rest[0:1], work.vectors[BUNDLE_ROW + 1, 0:1], work.vectors[BUNDLE_ROW + 2, 0:1]
+            low, high, mid = (
+                row(work, 1, n * BUNDLE_ROW),
+                row(work, 1, n * BUNDLE_ROW + 1),
+                row(work, 1, n * BUNDLE_ROW + 2),
+            )
             _output_of_box(S[n + 1], S[n + 2], C[k : k + 1], r[k : k + 1], low, high, mid)
             lower[k], upper[k] = max(lower[k], low[0]), min(upper[k], high[0])
             point[k] = middle(lower[k], upper[k])
@@ -134,19 +138,19 @@ def describe(family: int, S: Matrix, point: Vector, lower: Vector, upper: Vector
     """Fills point estimate and interval hull, each (n,), and returns the volume (of a bundle the smaller of both)."""
     n = S.shape[1]
     if family == PARALLELOTOPE:
-        no_error = work.vectors[BUNDLE_ROW]
+        no_error = row(work, n, BUNDLE_ROW)
         for i in range(n):
             no_error[i] = 0.0
         hull(S[0], S[1 : n + 1], no_error, lower, upper)
         for i in range(n):
             point[i] = S[0, i]
-        return volume_of(S[1 : n + 1], work.squares[FACTOR])
+        return volume_of(S[1 : n + 1], square(work, n, FACTOR))
     first = 0 if family == BOX else n + 1
     for i in range(n):
         lower[i], upper[i] = S[first, i], S[first + 1, i]
         point[i] = middle(lower[i], upper[i])
     size = _volume_of_box(lower, upper)
-    return size if family == BOX else min(size, volume_of(S[1 : n + 1], work.squares[FACTOR]))
+    return size if family == BOX else min(size, volume_of(S[1 : n + 1], square(work, n, FACTOR)))
 
 
 @kernel
@@ -161,7 +165,7 @@ def log_volume(family: int, S: Matrix, work: Scratch) -> float:
             width = S[first + 1, i] - S[first, i]
             logarithm += math.log(width) if width > 0.0 else -math.inf
     if family != BOX:
-        logarithm = min(logarithm, log_abs_determinant(S[1 : n + 1], work.squares[FACTOR]) + n * LOG_2)
+        logarithm = min(logarithm, log_abs_determinant(S[1 : n + 1], square(work, n, FACTOR)) + n * LOG_2)
     return logarithm
 
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.compile import inlined, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
 
 Matrix = NDArray[np.float64]
@@ -31,13 +31,13 @@ SMALLEST_DIVISOR = 1e-150
 """Below it an edge is never replaced: the quotients could overflow."""
 
 
-@inner
+@inlined
 def middle(lower: float, upper: float) -> float:
     """The middle of an interval, without overflow."""
     return 0.5 * lower + 0.5 * upper
 
 
-@inner
+@inlined
 def half_width(lower: float, upper: float, mid: float) -> float:
     """h with ``[mid − h, mid + h] ⊇ [lower, upper]``; exactly 0 for a point, exactly 1 for [−1, 1]."""
     reach = max(upper - mid, mid - lower)
@@ -98,7 +98,7 @@ def cut(c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, wo
     return UNCHANGED
 
 
-@inner
+@inlined
 def _tighten(g: Vector, low: float, high: float, spread: float, mid: Vector, half: Vector) -> tuple[int, float, bool]:
     """Own strips ``ξ_j ∈ mid_j ± half_j`` that ``low ≤ g'ξ ≤ high`` leaves; index and width of the widest; any cut?
 
@@ -125,7 +125,7 @@ def _tighten(g: Vector, low: float, high: float, spread: float, mid: Vector, hal
     return k, widest, tightened
 
 
-@inner
+@inlined
 def _shrink(c: Vector, T: Matrix, delta: Vector, mid: Vector, half: Vector) -> None:
     """``c ← c + T mid``, ``T ← T diag(half)``; what rounding loses goes to delta."""
     n = c.size
@@ -139,7 +139,7 @@ def _shrink(c: Vector, T: Matrix, delta: Vector, mid: Vector, half: Vector) -> N
         delta[i] = up(delta[i] + gamma(2 * n + 8) * magnitude)
 
 
-@inner
+@inlined
 def _replace_edge(
     c: Vector, T: Matrix, delta: Vector, k: int, low: float, high: float, g: Vector, mid: Vector, half: Vector
 ) -> None:

@@ -101,8 +101,7 @@ class Parallelotope(Support):
         offset = np.zeros(n) if shift is None else np.array(finite_array("shift", shift, (n,)))
         c, T, delta = np.empty(n), np.empty((n, n)), np.empty(n)
         parallelotope.image(self._center, self._generators, R, np.eye(n), offset, c, T, delta)
-        work = scratch(n, 0)
-        if enclose_along_edges(T, T, work.weights[0:0], delta, work):
+        if enclose_along_edges(T, T, np.zeros(0), delta, scratch(n, 0)):
             return Parallelotope(c, T)
         return None
 
