@@ -19,7 +19,7 @@ def main() -> None:
         began = time.perf_counter()
         run = run_filter(made(model, prior), data.Y, data.U)
         cost = (time.perf_counter() - began) / len(data.Y) * 1e6
-        inside = ((run.lower <= data.X) & (data.X <= run.upper)).all(axis=1).mean()
+        inside = ((data.X >= run.lower) & (data.X <= run.upper)).all(axis=1).mean()
         width, error = np.mean(run.upper - run.lower), np.sqrt(np.mean((run.points - data.X) ** 2))
         print(f"{made.kind:8}{inside:14.1%}{width:12.4f}{error:8.4f}{cost:11.2f}")
 

@@ -43,7 +43,8 @@ class LSUModel:
     ModelError
         Names every argument that is wrong, its value and what was expected.
 
-    Arrays are copied, read-only and float64. Source: Pavelková & Jirsa 2018, eq. (4); the noise map after Chisci et al. 1996.
+    Arrays are copied, read-only and float64. Source: Pavelková & Jirsa 2018, eq. (4); the noise map after Chisci et al.
+    1996.
     """
 
     def __init__(

@@ -184,7 +184,7 @@ class Bus:
         self._declared.clear()
         self._publishers.clear()
         try:
-            self._session.close()
+            self._session.close()  # type: ignore[no-untyped-call]
         except zenoh.ZError:
             return
 

@@ -26,7 +26,8 @@ class OutputPrediction(NamedTuple):
 class Filter(ABC):
     """A recursive estimator of x_k for ``x⁺ = A x + B u + N w``, ``y = C x + v``, ``|w| ≤ rho``, ``|v| ≤ r``.
 
-    Between steps the filter holds one set: before :meth:`update` the prior or prediction of x_k, after it the posterior.
+    Between steps the filter holds one set: before :meth:`update` the prior or prediction of x_k, after it the
+    posterior.
     """
 
     kind: ClassVar[str]

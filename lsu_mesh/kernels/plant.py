@@ -14,7 +14,7 @@ Vector = NDArray[np.float64]
 
 @kernel
 def bounded(A: Matrix, x: Vector, B: Matrix, u: Vector, unit: Vector, half_widths: Vector, out: Vector) -> None:
-    """``out = A x + B u + w`` with ``w = half_widths · unit`` shrunk, so that \\|out − A x − B u\\| ≤ half_widths exactly.
+    """``out = A x + B u + w`` with ``w = half_widths · unit`` shrunk: abs(out − A x − B u) ≤ half_widths exactly.
 
     A (k, n), B (k, p), ``|unit| ≤ 1`` (k,), half_widths (k,). Where a half-width is below the rounding error (0, say)
     w is 0 and out is the rounded value.
