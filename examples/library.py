@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from lsu_mesh import LSUCZ, LSUO, LSUP, LSUPB, Orthotope, fuse, run_filter, simulate, systems
+from lsu_mesh import LSUCZ, LSUO, LSUP, LSUPB, Orthotope, fuse, metrics, run_filter, simulate, systems
 
 
 def main() -> None:
@@ -19,8 +19,8 @@ def main() -> None:
         began = time.perf_counter()
         run = run_filter(made(model, prior), data.Y, data.U)
         cost = (time.perf_counter() - began) / len(data.Y) * 1e6
-        inside = ((data.X >= run.lower) & (data.X <= run.upper)).all(axis=1).mean()
-        width, error = np.mean(run.upper - run.lower), np.sqrt(np.mean((run.points - data.X) ** 2))
+        inside, error = metrics.containment(run.lower, run.upper, data.X), metrics.rmse(run.points, data.X)
+        width = metrics.mean_width(run.lower, run.upper).mean()
         print(f"{made.kind:8}{inside:14.1%}{width:12.4f}{error:8.4f}{cost:11.2f}")
 
     box, parallelotope = LSUO(model, prior), LSUP(model, prior)
