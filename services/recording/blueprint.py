@@ -16,6 +16,8 @@ from services.recording.timeline import SIM_TIME, STEP
 
 OVERVIEW_STATES = 6
 """States that the overview shows; all of them have their own tab where there are more."""
+FEW = 4
+"""Filters whose sets can be told apart in one view."""
 WINDOW = 100
 """Steps that plots of bands show."""
 Part = rrb.View | rrb.Container
@@ -46,7 +48,8 @@ def _overview(names: Names) -> Part:
         shown = list(dict.fromkeys([*names.axes(), *shown]))[:OVERVIEW_STATES]
     plots = [_bands(names, i) for i in shown]
     share = min(0.05 + 0.04 * len(names.estimators), 0.4)
-    left = rrb.Vertical(_space(names, frame.ALL, ["/space/sets/**"]), _status(), row_shares=[1.0 - share, share])
+    space = _space(names, frame.ALL, _sets_of_all(names))
+    left = rrb.Vertical(space, _status(), row_shares=[1.0 - share, share])
     columns = 1 if len(plots) <= 3 else 2
     volume = _whole("Log-volume of the sets", ["/log_volume/**"])
     rows = -(-len(plots) // columns)
@@ -58,15 +61,17 @@ def _filter(names: Names, name: str, kind: str) -> Part:
     below = [_plot(names, "Widths", [path("widths", name)])]
     if names.configuration.filters[name].transfer != "off":
         below.append(_plot(names, "Gain of the transfers [nat]", [path("gain", name)], legend=False))
-    space = _space(names, name, [f"{path('space', 'sets', name)}/**"])
+    space = _space(names, name, [_set_of(name)])
     left = rrb.Vertical(space, *below, row_shares=[3.0] + [1.0] * len(below))
     return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=f"{name} ({kind})")
 
 
 def _fusion(names: Names, name: str) -> Part:
     several = len(names.configuration.fusion) > 1
+    few = len(names.configuration.filters) <= FEW
+    space = _space(names, frame.ALL, _sets_of_all(names)) if few else _space(names, name, [_set_of(name)])
     left = rrb.Vertical(
-        _space(names, name, ["/space/sets/**"]),
+        space,
         _whole("Log-volume of the sets", ["/log_volume/**"]),
         rrb.StateTimelineView(name="Sources", origin="/", contents=[f"{path('trust', name)}/**"]),
         row_shares=[4, 2, 1.2],
@@ -129,7 +134,15 @@ def _errors(names: Names, state: int, peer: str) -> Part:
 
 def _output(names: Names, output: Output) -> Part:
     contents = [output.measured(), f"{path('outputs', output.sensor, output.part)}/**"]
-    return _plot(names, f"{output.label}: measured (grey), and predicted by the filters", contents, legend=False)
+    peers = [name for name, one in names.configuration.filters.items() if output.sensor in one.sensors]
+    outlined = [output.predicted(peer) for peer in peers] if len(peers) > 3 else []
+    return _plot(
+        names,
+        f"{output.label}: measured (grey), and predicted by the filters",
+        contents,
+        legend=False,
+        outlined=outlined,
+    )
 
 
 def _status() -> Part:
@@ -165,6 +178,19 @@ def _plot(
 def _whole(name: str, contents: list[str]) -> Part:
     """Series over the whole run."""
     return rrb.TimeSeriesView(name=name, origin="/", contents=contents)
+
+
+def _set_of(name: str) -> str:
+    return f"{path('space', 'sets', name)}/**"
+
+
+def _sets_of_all(names: Names) -> list[str]:
+    """Bodies of all peers; of many filters only the edges, so that the fused set stays visible among them."""
+    configuration = names.configuration
+    if len(configuration.filters) <= FEW:
+        return ["/space/sets/**"]
+    edges = [path("space", "sets", name, "edges") for name in configuration.filters]
+    return [*(_set_of(name) for name in configuration.fusion), *edges]
 
 
 def _space(names: Names, name: str, sets: list[str]) -> Part:

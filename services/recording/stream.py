@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import importlib.metadata
 import json
 import os
@@ -18,7 +19,6 @@ from lsu_mesh.mesh.config import Configuration
 from services.recording.blueprint import blueprint
 from services.recording.names import Names
 
-APPLICATION = "lsu-mesh"
 PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "rerun-sdk")
 
 
@@ -31,20 +31,28 @@ def open_stream(
     """
     _claim(path)
     rr.set_strict_mode(True)  # an error is an exception, which the recorder counts; else data vanish with a warning
-    flush = names.configuration.recorder.flush
+    configuration = names.configuration
     stream = rr.RecordingStream(
-        APPLICATION,
-        recording_id=f"{names.configuration.mesh.name}-{os.urandom(8).hex()}",
-        batcher_config=rr.ChunkBatcherConfig(flush_tick=flush),
+        application_id(configuration),
+        recording_id=f"{configuration.mesh.name}-{os.urandom(8).hex()}",
+        batcher_config=rr.ChunkBatcherConfig(flush_tick=configuration.recorder.flush),
     )
     sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(path)]
     if serve_port is not None:
         sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=serve_port, server_memory_limit="256MB"))
     stream.set_sinks(*sinks, default_blueprint=blueprint(names))
-    stream.send_recording_name(f"{names.configuration.mesh.name} {path.stem}")
-    properties: dict[str, Any] = run_description(names.configuration) | dict(run_properties)
+    stream.send_recording_name(f"{configuration.mesh.name} {path.stem}")
+    properties: dict[str, Any] = run_description(configuration) | dict(run_properties)
     stream.send_property("lsu_mesh", rr.AnyValues(**properties))
     return stream
+
+
+def application_id(configuration: Configuration) -> str:
+    """Name under which the viewer remembers a layout; no other mesh or version may open in the layout of this one."""
+    peers = [configuration.peers(), configuration.base_model.states, _version("lsu-mesh")]
+    kinds = [(one.kind, one.sensors, one.transfer) for one in configuration.filters.values()]
+    digest = hashlib.blake2b(json.dumps([peers, kinds]).encode(), digest_size=4).hexdigest()
+    return f"lsu-mesh {configuration.mesh.name} {digest}"
 
 
 def next_part(path: Path) -> Path:

@@ -1,0 +1,114 @@
+"""Recordings open in the real viewer without a complaint, and the pictures show what they should."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+import rerun.blueprint as rrb
+from headless_viewer import HeadlessViewer, why_not
+from made_up_mesh import START_NS, STEP_NS, MadeUpMesh, written
+from PIL import Image
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.messages import Event
+from services.recording.palette import TRUTH, Color, colors
+from services.recording.recorder import Recorder
+
+pytestmark = [
+    pytest.mark.viewer,
+    pytest.mark.skipif(why_not() is not None, reason=why_not() or ""),
+]
+CLOSE = 9
+"""Largest difference of hue, of 256, between a colour and what the viewer makes of it."""
+
+
+@pytest.fixture(scope="module")
+def viewer() -> Iterator[HeadlessViewer]:
+    with HeadlessViewer() as started:
+        yield started
+
+
+def pixels(picture: Path, color: Color, left: float = 0.0, right: float = 1.0) -> int:
+    """Pixels of a colour's hue between two shares of the picture's width; shades and veils keep the hue."""
+    image = np.asarray(Image.open(picture).convert("HSV")).astype(np.int16)
+    part = image[80:-80, int(left * image.shape[1]) : int(right * image.shape[1])]
+    hue = int(np.asarray(Image.new("RGB", (1, 1), color).convert("HSV"))[0, 0, 0])
+    apart = np.abs((part[:, :, 0] - hue + 128) % 256 - 128)
+    return int(((apart <= CLOSE) & (part[:, :, 1] > 110) & (part[:, :, 2] > 90)).sum())
+
+
+def recorded(configuration: Configuration, path: Path, steps: int = 160) -> Path:
+    """A run in which a filter dies and an event is told."""
+    mesh, recorder = MadeUpMesh(configuration), Recorder(configuration, path)
+    for role, name in configuration.peers():
+        recorder.peer_changed(role, name, True, START_NS)
+    arrivals = mesh.run(steps)
+    stamp = mesh.stamp("event", "filter/f1", steps // 2)
+    event = Event(**stamp, level="WARN", code="contradiction", text="the strip misses the set", about={"sensor": "s1"})
+    for arrival in [*arrivals, mesh.arrival(event, steps)]:
+        recorder.record(*arrival)
+        recorder.tick(arrival.arrival_ns)
+    recorder.peer_changed("sensor", "s1", False, START_NS + steps * STEP_NS)
+    recorder.close()
+    assert recorder.problems == []
+    return path
+
+
+def test_every_tab_of_three_states_is_drawn_without_a_complaint(viewer: HeadlessViewer, tmp_path: Path) -> None:
+    configuration = written(tmp_path)
+    viewer.open(recorded(configuration, tmp_path / "three.rrd"))
+    filters = ["f1 (LSUO)", "f2 (LSUP)", "f3 (LSUCZ)"]
+    assert viewer.tabs() == ["Overview", *filters, "Fusion", "Outputs", "Mesh", "Events"]
+    seen = pictures(viewer, viewer.tabs(), tmp_path)
+    assert viewer.complaints() == []
+    chosen = colors(configuration)
+    for name, tab in zip(("f1", "f2", "f3"), filters, strict=True):
+        assert pixels(seen["Overview"], chosen[name], 0.0, 0.4) > 300, "the set of every filter has edges"
+        assert pixels(seen["Overview"], chosen[name], 0.4) > 300, "the bounds of every filter are lines"
+        assert pixels(seen[tab], chosen[name], 0.0, 0.4) > 1000, "the filter's own tab shows its set"
+        assert pixels(seen[tab], chosen[name], 0.4) > 5000, "the filter's own tab shows its bands"
+        assert pixels(seen["Outputs"], chosen[name]) > 300, "the predicted outputs are there"
+    assert pixels(seen["Overview"], chosen["main"], 0.0, 0.4) > 1000, "the fused set is among them"
+    assert pixels(seen["Fusion"], chosen["main"], 0.4) > 5000, "the fused bands are there"
+    assert pixels(seen["Mesh"], (0, 160, 80), 0.5) > 10000, "the lanes are green"
+    assert pixels(seen["Events"], (255, 130, 0)) > 20, "a warning is orange"
+
+
+@pytest.mark.parametrize(("states", "filters"), [(1, 1), (2, 2), (6, 4), (12, 12)])
+def test_other_sizes_are_drawn_without_a_complaint(
+    states: int, filters: int, viewer: HeadlessViewer, tmp_path: Path
+) -> None:
+    configuration = written(tmp_path, states, filters)
+    viewer.open(recorded(configuration, tmp_path / "other.rrd"))
+    assert len(viewer.tabs()) == filters + 5 + (states > 6)
+    seen = pictures(viewer, ["Overview", "f1 (LSUO)"], tmp_path)
+    assert viewer.complaints() == []
+    chosen = colors(configuration)
+    assert pixels(seen["Overview"], TRUTH, 0.4) > 300, "the truth is a line in the plots"
+    assert pixels(seen["Overview"], chosen["main"], 0.4) > 3000, "the fused bands are there"
+    assert pixels(seen["Overview"], chosen["main"], 0.0, 0.4) > 100, "the fused set is there"
+    assert pixels(seen["f1 (LSUO)"], chosen["f1"], 0.0, 0.4) > 1000, "the filter's set is there"
+
+
+def pictures(viewer: HeadlessViewer, tabs: list[str], folder: Path) -> dict[str, Path]:
+    """A picture of every tab."""
+    taken = {tab: folder / f"{tab}.png" for tab in tabs}
+    for tab, picture in taken.items():
+        viewer.show(tab)
+        viewer.picture(picture)
+    return taken
+
+
+def test_the_viewer_does_complain_of_a_broken_recording(viewer: HeadlessViewer, tmp_path: Path) -> None:
+    """Guards the tests above: silence means something only where complaints are heard."""
+    stream = rr.RecordingStream("broken")
+    stream.set_sinks(rr.FileSink(tmp_path / "broken.rrd"), default_blueprint=rrb.Tabs(rrb.Spatial3DView(name="broken")))
+    stream.log("mesh", rr.Mesh3D(vertex_positions=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangle_indices=[[0, 1, 99]]))
+    stream.disconnect()
+    viewer.open(tmp_path / "broken.rrd")
+    viewer.picture(tmp_path / "broken.png")
+    assert any("broken" in complaint or "mesh" in complaint for complaint in viewer.complaints())
