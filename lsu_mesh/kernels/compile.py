@@ -48,6 +48,11 @@ def inner(function: F) -> F:
     return _compiled(function, _NO_WRAPPERS, optimisation=1)
 
 
+def calling(function: F) -> F:
+    """As :func:`kernel`, for a function that does little but call kernels: those are not optimised once more."""
+    return _compiled(function, {}, optimisation=1)
+
+
 def inlined(function: F) -> F:
     """As :func:`kernel`, copied into each caller: for tiny functions that call nothing but such ones."""
     return _compiled(function, {"forceinline": True}, optimisation=1)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.rounding import gamma, up
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ def dual_bound(d: Array, A: Array, b: Array, row_sums: Array, y: Array) -> float
     return dual_bound_in(d, A, b, row_sums, y, np.empty(d.size))
 
 
-@kernel
+@inner
 def dual_bound_in(d: Array, A: Array, b: Array, row_sums: Array, y: Array, reduced: Array) -> float:
     """Upper bound of ``max {d'ξ : A ξ = b, |ξ|∞ ≤ 1}`` from the multipliers y (m,), rounded up.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.lifted import row_scales
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 
@@ -42,7 +42,7 @@ def drop_constraint(n: int, L: Array, middle: Array, slack: Array) -> tuple[Arra
     return _without(L, i_best, j_best), _shorter(middle, i_best), _shorter(slack, i_best)
 
 
-@kernel
+@inner
 def overruns(n: int, L: Array, middle: Array, row_of: NDArray[np.int64], beyond: Array) -> None:
     """For each variable the constraint row that holds it best (−1: none) and how far beyond 1 that row lets it go."""
     N, g = L.shape
@@ -134,7 +134,7 @@ def eliminate(L: Array, middle: Array, slack: Array, i: int, j: int) -> None:
         slack[s] = up(up(slack[s] + up(abs(factor) * slack[i])) + up(lost * gamma(1) + UNDERFLOW))
 
 
-@kernel
+@inner
 def _without(L: Array, i: int, j: int) -> Array:
     """L without row i and column j; −1 keeps all columns."""
     N, g = L.shape
@@ -152,7 +152,7 @@ def _without(L: Array, i: int, j: int) -> Array:
     return left
 
 
-@kernel
+@inner
 def _shorter(v: Array, i: int) -> Array:
     left = np.empty(v.size - 1)
     a = 0

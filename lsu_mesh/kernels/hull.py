@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound_in
 from lsu_mesh.kernels.simplex import (
     basic_levels,
@@ -64,7 +64,7 @@ def open_program(A: Array, b: Array) -> tuple[int, Program]:
     return (TIGHT if found else LOOSE), program
 
 
-@kernel
+@inner
 def maximise(program: Program, d: Array, point: Array) -> tuple[float, bool]:
     """Safe upper bound of ``max d'ξ`` and whether ``point`` (g,), which is written, attains it to rounding.
 
@@ -147,7 +147,7 @@ def variable_ranges(program: Program, points: Array) -> tuple[Array, Array]:
     return low, high
 
 
-@kernel
+@inner
 def _contradicts(program: Program) -> bool:
     """Whether a row that depends on the others proves emptiness: its left side vanishes and its right side does not."""
     m, g = program.rows.shape
@@ -162,7 +162,7 @@ def _contradicts(program: Program) -> bool:
     return False
 
 
-@kernel
+@inner
 def _farkas(program: Program, sigma: Array) -> bool:
     """Whether the ray ``y = −σ'B⁻¹`` of phase one proves emptiness."""
     m, g = program.rows.shape

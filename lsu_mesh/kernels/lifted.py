@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.scaling import unit_factor
 
@@ -119,7 +119,7 @@ def without_zero_columns(L: Array) -> Array:
     return left
 
 
-@kernel
+@inner
 def row_scales(L: Array) -> Array:
     """``Σ_j |L_ij|`` of each row, for comparisons that do not depend on units; not rounded."""
     N, g = L.shape

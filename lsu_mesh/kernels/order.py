@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.lifted import row_scales
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.scaling import unit_factor
@@ -143,7 +143,7 @@ def approximate_inverse(D: Array) -> Array:
     return M
 
 
-@kernel
+@inner
 def _coordinates(M: Array, L: Array) -> Array:
     """``M L``, (N, g)."""
     N, g = L.shape
@@ -159,7 +159,7 @@ def _coordinates(M: Array, L: Array) -> Array:
     return T
 
 
-@kernel
+@inner
 def _least_harm(T: Array, length: Array, kept: NDArray[np.bool_]) -> int:
     """The kept column whose swallowing adds least: ``Π(1 + s_i) − 1 − Σ s_i`` with ``s_i = |t_i| / length_i``."""
     best, chosen = np.inf, -1
@@ -177,7 +177,7 @@ def _least_harm(T: Array, length: Array, kept: NDArray[np.bool_]) -> int:
     return chosen
 
 
-@kernel
+@inner
 def _swallow(D: Array, L: Array, j: int, T: Array, length: Array, slack: Array) -> None:
     """Lengthen the basis by |t| and add what ``L_j − D t`` leaves, rounded up, to the slack."""
     N = D.shape[0]
@@ -237,7 +237,7 @@ def swallow_box(columns: Array, M: Array, slack: Array) -> bool:
     return True
 
 
-@kernel
+@inner
 def _plus_image(given: Array, residual: Array, trial: Array, factor: float) -> Array:
     """``given + factor · residual · trial``, rounded up."""
     N = given.size

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inlined
 
 
-@kernel
+@inlined
 def unit_factor(x: float) -> float:
     """The power of two that brings x > 0 into [½, 1); 1 where x is 0, not finite, or extreme."""
     factor = 1.0

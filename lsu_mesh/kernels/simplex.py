@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inlined, inner
 from lsu_mesh.kernels.scaling import unit_factor
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ DEPENDENT = 1e-12
 """A row whose entries are all below this after elimination depends on the others (rows are scaled to 1)."""
 
 
-@kernel
+@inner
 def scaled_rows(A: Array, b: Array) -> tuple[Array, Array]:
     """A and b with each row multiplied by the power of two that brings its largest entry into [½, 1); exact."""
     m, g = A.shape
@@ -47,7 +47,7 @@ def scaled_rows(A: Array, b: Array) -> tuple[Array, Array]:
     return rows, sides
 
 
-@kernel
+@inner
 def canonical_tableau(A: Array) -> tuple[Array, Indices]:
     """``T = B⁻¹ [A | I]`` (m, g + m) and the basis (m,) by Gauss–Jordan elimination with full pivoting."""
     m, g = A.shape
@@ -73,7 +73,7 @@ def canonical_tableau(A: Array) -> tuple[Array, Indices]:
     return T, basis
 
 
-@kernel
+@inner
 def pivot_rows(T: Array, p: int, q: int) -> None:
     """Make column q the unit vector of row p."""
     m, width = T.shape
@@ -93,7 +93,7 @@ def pivot_rows(T: Array, p: int, q: int) -> None:
             other[q] = 0.0
 
 
-@kernel
+@inner
 def starting_bounds(T: Array, b: Array, basis: Indices, at: Array, level: Array) -> None:
     """Put each nonbasic variable at the bound that brings the basic ones nearer to 0."""
     m = T.shape[0]
@@ -119,7 +119,7 @@ def starting_bounds(T: Array, b: Array, basis: Indices, at: Array, level: Array)
             level[i] -= T[i, j] * at[j]
 
 
-@kernel
+@inner
 def basic_levels(T: Array, b: Array, basis: Indices, at: Array, level: Array) -> None:
     """Values of the basic variables, ``B⁻¹ b − Σ T_j at_j``, free of what the updates have lost."""
     m = T.shape[0]
@@ -137,7 +137,7 @@ def basic_levels(T: Array, b: Array, basis: Indices, at: Array, level: Array) ->
         level[i] = total
 
 
-@kernel
+@inner
 def blocking_row(
     T: Array, q: int, sign: float, basis: Indices, level: Array, phase_one: bool, bland: bool
 ) -> tuple[int, float]:
@@ -162,7 +162,7 @@ def blocking_row(
     return row, min(2.0, max(0.0, step_taken))
 
 
-@kernel
+@inlined
 def _step_to_bound(slope: float, level: float, phase_one: bool) -> tuple[float, float]:
     """How far the entering variable may go until a basic one, falling with ``slope``, stops it; pivot 0: never."""
     if abs(slope) <= PIVOT:
@@ -176,7 +176,7 @@ def _step_to_bound(slope: float, level: float, phase_one: bool) -> tuple[float, 
     return (value + 1.0) / pivot, pivot
 
 
-@kernel
+@inner
 def exchange(T: Array, basis: Indices, at: Array, level: Array, q: int, sign: float, row: int, step: float) -> None:
     """Move variable q by ``sign · step``; it becomes basic in ``row``, or has changed its bound when ``row`` is −1."""
     m = T.shape[0]
@@ -194,7 +194,7 @@ def exchange(T: Array, basis: Indices, at: Array, level: Array, q: int, sign: fl
     pivot_rows(T, row, q)
 
 
-@kernel
+@inner
 def entering_variable(reduced: Array, at: Array, tolerance: float, bland: bool) -> int:
     """A nonbasic variable that improves the objective: steepest, or by Bland's rule the first; −1 at an optimum."""
     best, q = tolerance, -1
@@ -208,7 +208,7 @@ def entering_variable(reduced: Array, at: Array, tolerance: float, bland: bool) 
     return q
 
 
-@kernel
+@inner
 def find_vertex(T: Array, basis: Indices, at: Array, level: Array, sigma: Array) -> bool:
     """Phase one: minimise the sum of what the basic variables are beyond ±1. ``False`` at the iteration limit.
 
@@ -244,7 +244,7 @@ def find_vertex(T: Array, basis: Indices, at: Array, level: Array, sigma: Array)
     return False
 
 
-@kernel
+@inner
 def climb(T: Array, basis: Indices, at: Array, level: Array, d: Array, reduced: Array, y: Array) -> bool:
     """Phase two: from a feasible vertex to one that maximises d; multipliers to y (m,). ``False`` at the limit.
 
@@ -288,7 +288,7 @@ def climb(T: Array, basis: Indices, at: Array, level: Array, d: Array, reduced: 
     return optimal
 
 
-@kernel
+@inner
 def refine_multipliers(A: Array, T: Array, basis: Indices, d: Array, y: Array) -> None:
     """One step of iterative refinement: ``y += B⁻ᵀ (d_B − B'y)``, with A itself instead of the tableau."""
     m, g = A.shape

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inlined, inner, kernel
 from lsu_mesh.kernels.hull import Program
 from lsu_mesh.kernels.simplex import basic_levels, climb
 
@@ -20,7 +20,7 @@ CONFIRMED = 1e-9
 """A triangle is done when no point lies farther beyond it than this."""
 
 
-@kernel
+@inner
 def farthest(program: Program, d: Array, point: Array) -> None:
     """A vertex ξ (g,) that maximises ``d'ξ``, in floating point; the program is left there."""
     basic_levels(program.tableau, program.sides, program.basis, program.at, program.level)
@@ -77,12 +77,12 @@ def split_triangles(program: Program, M: Array, origin: Array, corners: Array, m
     return found
 
 
-@kernel
+@inlined
 def _height(plane: Array, point: Array) -> float:
     return float(plane[0] * point[0] + plane[1] * point[1] + plane[2] * point[2] - plane[3])
 
 
-@kernel
+@inner
 def _add_triangle(
     points: Array, triangles: Triangles, planes: Array, alive: NDArray[np.bool_], used: int,
     a: int, b: int, c: int, inside: Array,
@@ -105,7 +105,7 @@ def _add_triangle(
     return used + 1
 
 
-@kernel
+@inner
 def _replace_visible(
     points: Array, triangles: Triangles, planes: Array, alive: NDArray[np.bool_], used: int, new: int, inside: Array
 ) -> int:

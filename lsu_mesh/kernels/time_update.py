@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
 from lsu_mesh.kernels.zonotope import absorb_box, padded
 
@@ -74,7 +74,7 @@ def predict_constrained(
     return finite, (centre, generators, columns, b), low, high
 
 
-@kernel
+@inner
 def image_of_interval(row: Array, lower: Array, upper: Array) -> tuple[float, float]:
     """``row · [lower, upper]``, row, lower, upper (n,), rounded outward."""
     low = 0.0

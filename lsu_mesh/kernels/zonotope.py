@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inlined, inner, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ def zonotope_map(R: Array, c: Array, G: Array, shift: Array) -> tuple[Array, Arr
     return centre, generators, slack
 
 
-@kernel
+@inlined
 def subtraction_error(x: float, y: float) -> float:
     """``(x − y) − fl(x − y)``, exact (Knuth's TwoSum)."""
     difference = x - y
@@ -110,7 +110,7 @@ def zonotope_support(c: Array, G: Array, d: Array) -> float:
     return up(level + spread + up(gamma(n + 4) * mass + gamma(g + 4) * (abs(level) + spread) + UNDERFLOW))
 
 
-@kernel
+@inner
 def padded(M: Array, rows: int, columns: int) -> Array:
     """M in the top left corner of a matrix of zeros (rows, columns)."""
     larger = np.zeros((rows, columns))
@@ -187,7 +187,7 @@ def parallelotope_volumes(G: Array) -> float:
             chosen[j] = chosen[j - 1] + 1
 
 
-@kernel
+@inner
 def _determinant(M: Array) -> float:
     """Determinant by elimination with row pivoting; M is overwritten."""
     n = M.shape[0]
