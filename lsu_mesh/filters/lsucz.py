@@ -28,6 +28,8 @@ from lsu_mesh.supports.reduction import Body, Limits, settle
 from lsu_mesh.supports.support import Support
 
 Vector = NDArray[np.float64]
+LITTLE_GAIN = 0.03
+"""Nats below which a transferred set is weighed against what the reduction of the intersection costs."""
 
 
 class Held(NamedTuple):
@@ -166,9 +168,13 @@ class LSUCZ(Filter):
         return self.support
 
     def condition(self, support: Support) -> float:
-        """Keep ``X ∩ support``; the gain, in nats, is that of the interval hulls."""
+        """Keep ``X ∩ support``; the gain, in nats, is that of the interval hulls.
+
+        A set that brings next to nothing, so that reducing the intersection to the limits costs more, changes only the
+        box that is held: a wide source does no harm.
+        """
         other = checked_prior(self._model, support)
-        before = self.bounds()
+        own, before = self._held, self.bounds()
         lower, upper = other.bounds()
         box = np.maximum(before[0], lower), np.minimum(before[1], upper)
         try:
@@ -178,7 +184,10 @@ class LSUCZ(Filter):
             raise InconsistentData(
                 f"the set of {self.kind} and the transferred set have no point in common"
             ) from contradiction
-        return hull_gain(before, self.bounds())
+        gain, is_reduced = hull_gain(before, self.bounds()), not self._limits.allow((own.body[0], *met))
+        if is_reduced and gain < LITTLE_GAIN and self._size(own.body) <= self._size(self._held.body):
+            self._hold(self._held._replace(body=own.body))
+        return gain
 
     def reset(self, support: Support) -> None:
         """Start again from a set that is known to hold the state now."""
@@ -208,6 +217,15 @@ class LSUCZ(Filter):
         if settled.empty:
             raise InconsistentData("the sets are proved to have no point in common")
         return Held(settled.body, settled.lower, settled.upper, is_hull=True)
+
+    def _size(self, body: Body) -> float:
+        """Σ log of a set's widths along the axes and their diagonals, axes in units of the box that is held."""
+        widths = self._held.upper - self._held.lower
+        scaled = np.diag(1.0 / np.where(widths > 0, widths, 1.0))
+        first, second = np.triu_indices(widths.size, 1)
+        directions = np.vstack([scaled, scaled[first] + scaled[second], scaled[first] - scaled[second]])
+        low, high = ConstrainedZonotope.of_arrays(*body).ranges(directions)
+        return float(np.log(np.maximum(high - low, np.finfo(np.float64).tiny)).sum())
 
     def _transferable(self, other: Support) -> Body:
         """The other set's arrays, or those of its box where it is far more complex than this filter's own."""

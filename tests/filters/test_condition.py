@@ -133,3 +133,18 @@ def test_a_parallelotope_whose_hull_a_strip_would_push_out_is_shortened_instead(
     lower, upper = kept.bounds()
     assert lower == pytest.approx([-0.05, -1.0])
     assert upper == pytest.approx([1.0, 0.05])
+
+
+def test_a_wide_source_does_not_spend_the_complexity_of_a_constrained_zonotope() -> None:
+    estimator, x = prepared("LSUCZ", 5)
+    body = estimator.support
+    assert isinstance(body, ConstrainedZonotope)
+    wide, _ = prepared("LSUCZ", 5)
+    for _ in range(STEPS):
+        wide.predict([0.0])
+    lower, upper = wide.bounds()
+    shift = x - 0.5 * (lower + upper)
+    assert estimator.condition(wide.support.linear_map(np.eye(3), shift)) < 0.01
+    after = estimator.support
+    assert isinstance(after, ConstrainedZonotope)
+    assert all((old == new).all() for old, new in zip(body.arrays, after.arrays, strict=True))
