@@ -48,11 +48,11 @@ def predict(
             reach += abs(G[i, j]) * widths[j]
         reach += gamma(n + p + 2) * magnitude
         reach += gamma(2 * n + p + k + 8) * reach
-        if reach > 0.0:
+        if reach == 0.0:
+            new_lower[i], new_upper[i] = centre, centre
+        else:
             reach += UNDERFLOW
             new_lower[i], new_upper[i] = down(centre - reach), up(centre + reach)
-        else:
-            new_lower[i], new_upper[i] = centre, centre
         finite = finite and math.isfinite(new_lower[i]) and math.isfinite(new_upper[i])
     return 0 if finite else OVERFLOW
 

@@ -76,15 +76,15 @@ def enclose_orthogonally(T: Matrix, G: Matrix, widths: Vector, delta: Vector, wo
         for j in range(n):
             basis[i, j] *= scale[i]
     for i in range(n):
-        grown[i] = up(_noise_reach(inverse, i, G, widths, delta) + _edge_reach(inverse, i, T))
+        grown[i] = inflate(_noise_reach(inverse, i, G, widths, delta) + _edge_reach(inverse, i, T), n)
         own[i] = 0.0
     return _grow(basis, inverse, grown, own, work, T)
 
 
 @inlined
 def inflate(x: float, operations: int) -> float:
-    """x ≥ 0 rounded up by the relative error of as many operations on non-negative numbers; 0 stays 0."""
-    return x + gamma(operations) * x + UNDERFLOW if x > 0.0 else 0.0
+    """x ≥ 0 rounded up by the relative error of as many operations on non-negative numbers; 0 stays 0, NaN NaN."""
+    return 0.0 if x == 0.0 else x + gamma(operations) * x + UNDERFLOW
 
 
 @inlined
@@ -148,7 +148,8 @@ def _edge_reach(M: Matrix, i: int, T: Matrix) -> float:
 def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Matrix) -> bool:
     """``T ← V diag(own + z)`` where ``z ≥ |V⁻¹ e|`` for every e whose ``|M e| ≤ grown``; V and T may be the same.
 
-    The rounding of the products is enclosed as well. ``False``, T untouched, where ``M ≈ V⁻¹`` is not good enough.
+    The rounding of the products is enclosed as well. ``False`` where ``M ≈ V⁻¹`` is not good enough (T is untouched) or
+    a product overflows.
     """
     n = V.shape[0]
     residual, first = row(work, n, ENCLOSE + 3), row(work, n, ENCLOSE + 4)
@@ -164,7 +165,7 @@ def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Ma
         size = 0.0
         for j in range(n):
             size += abs(V[i, j]) * (own[j] + first[j])
-        lost[i] = inflate(4.0 * UNIT_ROUNDOFF * size, n + 4)
+        lost[i] = inflate(8.0 * UNIT_ROUNDOFF * size, n + 4)
     for i in range(n):
         reach = grown[i]
         for k in range(n):
@@ -172,14 +173,17 @@ def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Ma
         grown[i] = inflate(reach, n + 4)
     _solve_bound(grown, residual, largest, final)
     for i in range(n):
-        final[i] = up(own[i] + final[i]) if own[i] + final[i] > 0.0 else 0.0
-        # ``lost`` was made from ``first``: it holds for ``final`` as long as that is not twice as large
-        if not (final[i] <= 1.75 * (own[i] + first[i]) and math.isfinite(final[i])):
+        final[i] += own[i]
+        final[i] = 0.0 if final[i] == 0.0 else up(final[i])
+        # ``lost`` was made from ``first``: it holds for ``final`` as long as that is not eight times as large
+        if not (final[i] <= 7.0 * (own[i] + first[i]) and math.isfinite(final[i])):
             return False
+    finite = True
     for i in range(n):
         for j in range(n):
             T[i, j] = V[i, j] * final[j]
-    return True
+            finite = finite and math.isfinite(T[i, j])
+    return finite
 
 
 @inlined

@@ -39,9 +39,9 @@ def middle(lower: float, upper: float) -> float:
 
 @inlined
 def half_width(lower: float, upper: float, mid: float) -> float:
-    """h with ``[mid − h, mid + h] ⊇ [lower, upper]``; exactly 0 for a point, exactly 1 for [−1, 1]."""
+    """h with ``[mid − h, mid + h] ⊇ [lower, upper]``; exact for a point and for [−h, h]."""
     reach = max(upper - mid, mid - lower)
-    if reach <= 0.0 or (lower == -1.0 and upper == 1.0):
+    if reach <= 0.0 or upper == -lower:
         return reach
     return up(reach)
 

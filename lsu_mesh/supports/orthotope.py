@@ -54,10 +54,11 @@ class Orthotope(Support):
 
     @property
     def half_widths(self) -> Vector:
-        """q (n,) with ``[center − q, center + q] ⊇ [lower, upper]``; exactly 0 where the box is flat."""
+        """q (n,) with ``[center − q, center + q] ⊇ [lower, upper]``; exact where the box is flat or symmetric."""
         center = self.center
         reach = np.maximum(self.upper - center, center - self.lower)
-        return np.where(reach > 0, reach + (reach * EPSILON + UNDERFLOW), 0.0)
+        exact = (reach <= 0) | (self.upper == -self.lower)
+        return np.where(exact, reach, reach + (reach * EPSILON + UNDERFLOW))
 
     def bounds(self) -> tuple[Vector, Vector]:
         return self.lower, self.upper

@@ -1,0 +1,111 @@
+"""A plant in exact rationals: the truth against which a guarantee is tested, noise at the corners included."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from lsu_mesh import LSUModel, Orthotope
+
+Exact = list[Fraction]
+
+KINDS = ("stable", "unstable", "singular", "rank one", "degenerate", "dyadic", "flat prior")
+
+
+class Case(NamedTuple):
+    """A model, a prior, and whether the noise is drawn inside its bounds or at their corners."""
+
+    model: LSUModel
+    prior: Orthotope
+    inside: bool
+
+
+class Step(NamedTuple):
+    """State of the step (exact), the outputs as the filter gets them, the input that drives it on."""
+
+    x: Exact
+    y: np.ndarray
+    u: np.ndarray
+
+
+def draw_case(rng: np.random.Generator, kind: str) -> Case:
+    """A random model of this kind: n 1–6, m 1–4, scale 1e-6 … 1e6, an input in half of the cases."""
+    n, m = int(rng.integers(1, 7)), int(rng.integers(1, 5))
+    scale = 10.0 ** int(rng.integers(-6, 7))
+    if kind == "dyadic":  # everything is representable for some steps, so that r = 0 and rho = 0 can be true
+        A = rng.integers(-2, 3, size=(n, n)) / 2.0
+        C = rng.integers(-2, 3, size=(m, n)) / 2.0
+        rho, r = rng.choice([0.0, 0.5, 1.0], size=n), rng.choice([0.0, 0.25], size=m)
+        return Case(LSUModel(A, None, C, rho, r), Orthotope(-np.ones(n), np.ones(n)), False)
+    A = rng.normal(size=(n, n))
+    A *= {"unstable": 1.3}.get(kind, 0.9) / max(1e-9, np.abs(np.linalg.eigvals(A)).max())
+    if kind == "singular":
+        A[:, 0] = A[:, -1] if n > 1 else 0.0
+    B = rng.normal(size=(n, 1)) if rng.random() < 0.5 else None
+    noise_map = rng.normal(size=(n, 1)) if kind == "rank one" else None
+    rho = scale * rng.random(n if noise_map is None else 1)
+    r = scale * (0.05 + rng.random(m))
+    if kind == "degenerate":
+        rho, r = rho * rng.choice([0.0, 1e-9, 1.0], size=n), r * 1e-7
+    center, widths = scale * rng.normal(size=n), scale * (0.1 + rng.random(n))
+    if kind == "flat prior":
+        widths *= rng.choice([0.0, 1.0], size=n)
+    model = LSUModel(A, B, rng.normal(size=(m, n)), rho, r, noise_map)
+    return Case(model, Orthotope(center - widths, center + widths), bool(rng.random() < 0.3))
+
+
+def exact_steps(case: Case, rng: np.random.Generator, steps: int) -> Iterator[Step]:
+    """Simulate in rationals from a corner (or the inside) of the prior; outputs end the sequence where none is true."""
+    model = case.model
+    N = np.eye(model.state_count) if model.noise_map is None else model.noise_map
+    lower, upper = case.prior.bounds()
+    share = unit_noise(rng, lower.size, case.inside)
+    x = [
+        (Fraction(a) + Fraction(z)) / 2 + (Fraction(z) - Fraction(a)) / 2 * s
+        for a, z, s in zip(lower.tolist(), upper.tolist(), share, strict=True)
+    ]
+    for _ in range(steps):
+        y = measured(model.C, model.r, x, unit_noise(rng, model.output_count, case.inside))
+        u = rng.normal(size=model.input_count)
+        yield Step(x, y, u)
+        w = [
+            Fraction(a) * s
+            for a, s in zip(model.rho.tolist(), unit_noise(rng, model.rho.size, case.inside), strict=True)
+        ]
+        parts = [exact_product(model.A, x), exact_product(N, w)]
+        if model.B is not None:
+            parts.append(exact_product(model.B, [Fraction(v) for v in u.tolist()]))
+        x = [sum(entries, Fraction(0)) for entries in zip(*parts, strict=True)]
+
+
+def unit_noise(rng: np.random.Generator, size: int, inside: bool) -> Exact:
+    """Noise in [−1, 1], at its ends unless ``inside``."""
+    if inside:
+        return [Fraction(v) for v in rng.uniform(-1, 1, size).tolist()]
+    return [Fraction(int(v)) for v in rng.choice([-1, 1], size)]
+
+
+def exact_product(M: np.ndarray, x: Exact) -> Exact:
+    """``M x`` without rounding."""
+    return [sum((Fraction(a) * v for a, v in zip(row, x, strict=True)), Fraction(0)) for row in M.tolist()]
+
+
+def measured(C: np.ndarray, r: np.ndarray, x: Exact, noise: Exact) -> np.ndarray:
+    """Outputs as doubles that keep ``|y − C x| ≤ r`` exactly; NaN (missing) where r is too small for any double."""
+    y = np.empty(len(r))
+    for i, (output, width, unit) in enumerate(zip(exact_product(C, x), r.tolist(), noise, strict=True)):
+        y[i] = float(output + Fraction(width) * unit)
+        for _ in range(3):
+            if abs(Fraction(float(y[i])) - output) > Fraction(width):
+                y[i] = np.nextafter(y[i], float(output))
+        if abs(Fraction(float(y[i])) - output) > Fraction(width):
+            y[i] = np.nan
+    return y
+
+
+def inside_box(lower: np.ndarray, upper: np.ndarray, x: Exact) -> bool:
+    """Whether the exact point lies in the box; no tolerance."""
+    return all(Fraction(a) <= v <= Fraction(z) for a, v, z in zip(lower.tolist(), x, upper.tolist(), strict=True))

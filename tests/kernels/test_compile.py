@@ -1,0 +1,31 @@
+"""What decides whether machine code in the cache may be used again."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lsu_mesh.kernels import compile as compiling
+
+
+def test_the_code_of_a_kernel_depends_on_every_kernel_that_it_calls() -> None:
+    assert {"loops", "step", "bundle", "box", "strip", "rounding", "compile"} <= compiling._closure("loops")
+    assert compiling._closure("rounding") == {"rounding", "compile"}
+
+
+def test_a_changed_callee_changes_the_stamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "caller.py").write_text("from lsu_mesh.kernels.callee import f\n")
+    (tmp_path / "callee.py").write_text("f = 1\n")
+    monkeypatch.setattr(compiling, "_FOLDER", tmp_path)
+    before = compiling._stamp.__wrapped__("caller")
+    (tmp_path / "callee.py").write_text("f = 2\n")
+    assert compiling._stamp.__wrapped__("caller") != before
+
+
+def test_kernels_work_where_no_cache_can_be_written(tmp_path: Path) -> None:
+    program = "from lsu_mesh.kernels.rounding import up; assert up(1.0) > 1.0"
+    environment = {"NUMBA_CACHE_DIR": "/proc/nowhere", "HOME": "/proc/nowhere", "PATH": "/usr/bin"}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True, cwd=tmp_path)
