@@ -42,6 +42,7 @@ class HeadlessViewer:
         self._process: subprocess.Popen[bytes] | None = None
         self._client: ViewerClient | None = None
         self._started = 0.0
+        self._heard: int | None = None
 
     def __enter__(self) -> HeadlessViewer:
         home = Path(self._folder.name)
@@ -74,6 +75,8 @@ class HeadlessViewer:
     def open(self, path: Path) -> None:
         """Open a recording and wait until it is loaded."""
         client = self._require_client()
+        logs = client.get_logs()
+        self._heard = logs[-1].sequence if logs else None
         client.open(str(path.resolve()))
 
         def is_loaded() -> bool:
@@ -108,7 +111,7 @@ class HeadlessViewer:
         self._require_client().save_screenshot(str(path))
 
     def complaints(self) -> list[str]:
-        """Reports of the views and warnings of the viewer about the recording."""
+        """Reports of the views and warnings of the viewer since the recording was opened."""
         client = self._require_client()
         reports = [
             f"view {view.name}: {report.severity}: {report.summary} {report.details or ''}"
@@ -117,7 +120,7 @@ class HeadlessViewer:
         ]
         warnings = [
             f"{entry.level} {entry.target}: {entry.message}"
-            for entry in client.get_logs()
+            for entry in client.get_logs(self._heard)
             if entry.level in ("WARN", "ERROR") and not entry.message.startswith(HARMLESS)
         ]
         return reports + warnings

@@ -43,15 +43,16 @@ class Frame:
         self._axes = names.axes()
         self._labels = [names.states[axis] for axis in self._axes]
         self._units = [names.configuration.base_model.units[axis] for axis in self._axes]
-        self._scale: Array | None = None
+        self.scale: Array | None = None
+        """What is shown as one unit, per axis."""
         self._rows: dict[int, tuple[Moment, Array, Array]] = {}
         self._axes_rows: list[tuple[Moment, Array]] = []
 
     def look_at(self, moment: Moment, center: Array, half_widths: Array) -> None:
         """Centre (d,) and half-widths (d,) of what is to be seen at a step."""
-        scale = self._scale
+        scale = self.scale
         if scale is None or not _fits(half_widths, scale):
-            scale = self._scale = readable_scale(half_widths)
+            scale = self.scale = readable_scale(half_widths)
             self._axes_rows.append((moment, scale))
         self._rows[moment.step] = (moment, center, scale)
 

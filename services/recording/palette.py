@@ -9,7 +9,7 @@ from lsu_mesh.mesh.config import Configuration
 Color = tuple[int, int, int]
 
 TRUTH: Color = (235, 20, 130)
-FUSIONS: tuple[Color, ...] = ((255, 130, 0), (205, 95, 0), (255, 170, 60))
+FUSIONS: tuple[Color, ...] = ((255, 130, 0), (205, 95, 0), (235, 150, 40))
 FILTERS: tuple[Color, ...] = (
     (30, 120, 255),
     (0, 170, 75),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Truth
@@ -23,8 +25,19 @@ from services.recording.topology import Topology
 
 NOTHING: Mapping[str, str] = MappingProxyType({})
 FLUSH_TIMEOUT_S = 10.0
+GOING_ON_NS = 300_000_000
+"""Data that come so long after a departure show that the mesh goes on."""
+AFTERMATH_NS = 3_000_000_000
+"""How long a departure may be the beginning of the end of the run."""
 DRAWING_INTERVAL_S = 1.0
 """How often drawings are written where no viewer follows; raw payloads are written at every flush."""
+
+
+class _Presence(NamedTuple):
+    role: str
+    name: str
+    alive: bool
+    moment: Moment
 
 
 class Recorder:
@@ -78,6 +91,7 @@ class Recorder:
         patience = 0 if serve_port is not None else int(DRAWING_INTERVAL_S * 1e9)
         self._drawing_interval_ns = max(self._interval_ns, patience)
         self._latest_step = 0
+        self._departures: list[_Presence] = []
         self._unflushed: dict[str, int] = {}
         self._counts: Counter[str] = Counter()
         self._closed = False
@@ -95,11 +109,17 @@ class Recorder:
             self._guarded(f"drawing {message.topic} of {message.src}", lambda: self._draw(message, arrival_ns))
 
     def peer_changed(self, role: str, name: str, alive: bool, now_ns: int) -> None:
-        """A peer came or went."""
-        self._guarded(f"drawing the presence of {name}", lambda: self._draw_presence(role, name, alive, now_ns))
+        """A peer came or went. At the end of a run all go: a departure is drawn when the mesh goes on without it."""
+        if alive:
+            self._draw_departures(now_ns, patience_ns=0)
+            presence = _Presence(role, name, True, self._now(now_ns))
+            self._guarded(f"drawing the presence of {name}", lambda: self._draw_presence(presence))
+        else:
+            self._departures.append(_Presence(role, name, False, self._now(now_ns)))
 
     def tick(self, now_ns: int) -> None:
         """Flush when the interval is over."""
+        self._draw_departures(now_ns, AFTERMATH_NS)
         if now_ns >= self._next_flush_ns:
             self._next_flush_ns = now_ns + self._interval_ns
             if now_ns >= self._next_drawing_ns:
@@ -128,6 +148,12 @@ class Recorder:
         if self._closed:
             return
         self._closed = True
+        if self._departures:
+            names = ", ".join(presence.name for presence in self._departures)
+            moment = self._departures[-1].moment
+            self._guarded(
+                "drawing events", lambda: self._events.tell("recorder", moment, "INFO", f"the run ended: {names}")
+            )
         self._guarded("drawing space", self._space.finish)
         self.flush()
         self._guarded("closing the file", self._stream.disconnect)
@@ -136,6 +162,8 @@ class Recorder:
         self._names.check(message)
         moment = Moment(message.step, arrival_ns)
         self._latest_step = max(self._latest_step, message.step)
+        if isinstance(message, Posterior | Truth | Measurement):
+            self._draw_departures(arrival_ns, GOING_ON_NS)
         if isinstance(message, Posterior):
             self._estimates.add(message, arrival_ns)
             self._space.add(message, arrival_ns)
@@ -152,11 +180,19 @@ class Recorder:
         elif isinstance(message, Event):
             self._events.add(message, moment if message.step else self._now(arrival_ns))
 
-    def _draw_presence(self, role: str, name: str, alive: bool, now_ns: int) -> None:
-        now = self._now(now_ns)
-        self._status.peer_changed(name, alive, now)
-        self._topology.peer_changed(role, name, alive, now)
-        self._events.tell(name, now, "INFO" if alive else "WARN", f"{role} {'is there' if alive else 'is gone'}")
+    def _draw_departures(self, now_ns: int, patience_ns: int) -> None:
+        due = [presence for presence in self._departures if now_ns - presence.moment.wall_ns >= patience_ns]
+        if due:
+            self._departures = [presence for presence in self._departures if presence not in due]
+            for presence in due:
+                self._guarded(f"drawing the presence of {presence.name}", partial(self._draw_presence, presence))
+
+    def _draw_presence(self, presence: _Presence) -> None:
+        role, name, alive, moment = presence
+        self._status.peer_changed(name, alive, moment)
+        self._topology.peer_changed(role, name, alive, moment)
+        text = f"{role} {'is there' if alive else 'is gone'}"
+        self._events.tell(name, moment, "INFO" if alive else "WARN", text)
 
     def _now(self, now_ns: int) -> Moment:
         """The moment of what belongs to no step of its own."""

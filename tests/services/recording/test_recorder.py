@@ -182,6 +182,9 @@ def test_peers_that_go_are_seen_in_lanes_graph_and_events(configuration: Configu
     for arrival in mesh.run(5):
         recorder.record(*arrival)
     recorder.peer_changed("filter", "f1", False, START_NS + 6 * STEP_NS)
+    for arrival in mesh.run(30):
+        if arrival.message.name != "f1":
+            recorder.record(*arrival)
     recorder.peer_changed("peer", "stranger/über", True, START_NS + 6 * STEP_NS)
     event = Event(
         **mesh.stamp("event", "filter/f2", 4), level="ERROR", code="late", text="too late", about={"sensor": "s1"}
@@ -196,6 +199,31 @@ def test_peers_that_go_are_seen_in_lanes_graph_and_events(configuration: Configu
     assert drawn(path, "/events/f2", "TextLog:level") == [(4, ["ERROR"])]
     nodes = drawn(path, "/topology", "GraphNodes:node_ids")[-1][1]
     assert {"f1", "s1", "plant", "main", "recorder", "stranger/über"} <= set(nodes)
+
+
+def test_the_end_of_a_run_is_no_series_of_failures(configuration: Configuration, tmp_path: Path) -> None:
+    recorder = Recorder(configuration, tmp_path / "x.rrd")
+    for name in ("f1", "f2"):
+        recorder.peer_changed("filter", name, True, START_NS)
+    for arrival in MadeUpMesh(configuration).run(5):
+        recorder.record(*arrival)
+    for name in ("f1", "f2"):
+        recorder.peer_changed("filter", name, False, START_NS + 6 * STEP_NS)
+    recorder.close()
+    assert [s for _, s in drawn(recorder.path, "/status/f1", "StateChange:state")] == [["ok"]]
+    assert drawn(recorder.path, "/events/recorder", "TextLog:text") == [
+        (5, ["step 5, recorder: the run ended: f1, f2"])
+    ]
+    assert drawn(recorder.path, "/events/f1", "TextLog:level") == [(0, ["INFO"])]
+
+
+def test_a_departure_is_drawn_when_nothing_follows_for_long(configuration: Configuration, tmp_path: Path) -> None:
+    recorder = Recorder(configuration, tmp_path / "x.rrd")
+    recorder.peer_changed("filter", "f1", True, START_NS)
+    recorder.peer_changed("filter", "f1", False, START_NS + 10**9)
+    recorder.tick(START_NS + 5 * 10**9)
+    recorder.close()
+    assert [s for _, s in drawn(recorder.path, "/health/f1", "StateChange:state")] == [["OK"], ["gone"]]
 
 
 def test_what_cannot_be_drawn_is_counted_and_stored_all_the_same(configuration: Configuration, tmp_path: Path) -> None:
