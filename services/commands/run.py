@@ -171,7 +171,9 @@ def _arguments(run: Run, role: str) -> list[str]:
     """What a child is started with: the configuration of this run."""
     file = run.options.file if run.options.file is not None else str(DEMO)
     arguments = ["-c", file, "-e", run.configuration.network.entry]
-    for override in [*flags(run.options), *run.options.overrides]:
+    last = _last_step(run.configuration)
+    end = [] if last is None else [f"mesh.steps={last}"]
+    for override in [*flags(run.options), *run.options.overrides, *end]:
         arguments += ["-X", override]
     if role in ("plant", "sensor"):
         arguments += ["--start-at", "-"]
