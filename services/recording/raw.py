@@ -1,11 +1,13 @@
 """Raw payloads, lossless: every message as it came, the source of truth of a recording.
 
 One entity per topic and name, ``/raw/<topic>/<name>``, and ``/raw/refused`` for payloads that are no message of this
-mesh. A row holds ``payload`` (bytes), ``key``, ``arrival_ns`` and ``number`` (order of arrival at the recorder).
+mesh. A row holds ``payload`` (bytes), ``key``, ``arrival_ns`` and ``number``, which orders all rows by arrival: it
+counts from the nanosecond at which the recorder started, so that a later part of a recording counts on.
 """
 
 from __future__ import annotations
 
+import time
 from collections import defaultdict
 from dataclasses import dataclass, field
 
@@ -38,7 +40,7 @@ class RawStore:
         self._timelines = timelines
         self._entities: dict[str, str] = {}
         self._rows: defaultdict[str, _Rows] = defaultdict(_Rows)
-        self._number = 0
+        self._number = time.time_ns()
 
     def add(self, key: str, payload: bytes, arrival_ns: int, message: Message | None) -> None:
         """Keep a payload for the next flush."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
+from services.recording.mend import mend
 from services.recording.raw import ARCHETYPE, REFUSED
 
 
@@ -27,19 +29,25 @@ def read_raw(path: Path, *, refused: bool = False) -> list[RawMessage]:
     """
     if not path.is_file():
         raise FileNotFoundError(2, "no such recording", str(path))
-    rows: list[tuple[int, RawMessage]] = []
     try:
-        with warnings.catch_warnings():
-            # A recording that is still written, or whose writer was killed, has no footer.
-            warnings.filterwarnings("ignore", message="RRD file has no footer")
-            chunks = RrdReader(path).stream().filter(content="/raw/**")
-        for chunk in chunks:
-            if refused or chunk.entity_path != REFUSED:
-                rows += _rows(chunk.to_record_batch())
-    except (RuntimeError, OSError) as error:
-        raise ValueError(f"{path} cannot be read as a recording: {error}") from error
+        rows = _read(path, refused)
+    except RuntimeError:  # a message is cut short: what is whole is read from a mended copy
+        with tempfile.TemporaryDirectory(prefix="read-") as folder:
+            copy = Path(folder) / "mended.rrd"
+            mend([path], copy)
+            rows = _read(copy, refused)
     rows.sort(key=lambda row: row[0])
     return [message for _, message in rows]
+
+
+def _read(path: Path, refused: bool) -> list[tuple[int, RawMessage]]:
+    with warnings.catch_warnings():
+        # A recording that is still written, or whose writer was killed, has no footer.
+        warnings.filterwarnings("ignore", message="RRD file has no footer")
+        chunks = RrdReader(path).stream().filter(content="/raw/**")
+    return [
+        row for chunk in chunks if refused or chunk.entity_path != REFUSED for row in _rows(chunk.to_record_batch())
+    ]
 
 
 def _rows(batch: pa.RecordBatch) -> list[tuple[int, RawMessage]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -25,6 +26,8 @@ from services.recording.topology import Topology
 
 NOTHING: Mapping[str, str] = MappingProxyType({})
 FLUSH_TIMEOUT_S = 10.0
+WRITER_ENDED = "File-writer thread shut down"
+"""What a flush says after an error of the disk, from which Rerun's writer does not come back."""
 GOING_ON_NS = 300_000_000
 """Data that come so long after a departure show that the mesh goes on."""
 AFTERMATH_NS = 3_000_000_000
@@ -54,6 +57,9 @@ class Recorder:
     serve_port:
         Port of the loopback on which viewers may follow; ``None``: no network.
 
+    continues:
+        An earlier part of the same run, after a restart of the recorder; ``mend`` joins the parts.
+
     Raises
     ------
     OSError
@@ -70,6 +76,7 @@ class Recorder:
         *,
         run_properties: Mapping[str, str] = NOTHING,
         serve_port: int | None = None,
+        continues: Path | None = None,
     ) -> None:
         self._names = names = Names(configuration)
         timelines = Timelines(configuration.mesh.dt)
@@ -77,7 +84,7 @@ class Recorder:
         self.path = path
         self.flushed: dict[str, int] = {}
         """Per key the last ``seq`` that is known to be in the file."""
-        self._stream = stream = open_stream(names, path, run_properties, serve_port)
+        self._stream = stream = open_stream(names, path, run_properties, serve_port, continues)
         self._raw = RawStore(stream, timelines)
         self._estimates = Estimates(stream, timelines, names, colors)
         self._space = Space(stream, timelines, names, colors)
@@ -92,6 +99,8 @@ class Recorder:
         self._drawing_interval_ns = max(self._interval_ns, patience)
         self._latest_step = 0
         self._departures: list[_Presence] = []
+        self._broken = ""
+        """Why nothing more is recorded, once that is so."""
         self._unflushed: dict[str, int] = {}
         self._counts: Counter[str] = Counter()
         self._closed = False
@@ -99,10 +108,16 @@ class Recorder:
     @property
     def problems(self) -> list[str]:
         """What went wrong so far, each kind once with its count."""
-        return [text if count == 1 else f"{text} ({count} times)" for text, count in self._counts.items()]
+        return [
+            f"{text}: {count}" if text == self._broken else text if count == 1 else f"{text} ({count} times)"
+            for text, count in self._counts.items()
+        ]
 
     def record(self, key: str, payload: bytes, arrival_ns: int, message: Message | None) -> None:
         """Keep a payload, and draw its message; ``None`` where the payload was refused."""
+        if self._broken:
+            self._counts[self._broken] += 1
+            return
         self._raw.add(key, payload, arrival_ns, message)
         if message is not None:
             self._unflushed[key] = message.seq
@@ -120,7 +135,7 @@ class Recorder:
     def tick(self, now_ns: int) -> None:
         """Flush when the interval is over."""
         self._draw_departures(now_ns, AFTERMATH_NS)
-        if now_ns >= self._next_flush_ns:
+        if now_ns >= self._next_flush_ns and not self._broken:
             self._next_flush_ns = now_ns + self._interval_ns
             if now_ns >= self._next_drawing_ns:
                 self._next_drawing_ns = now_ns + self._drawing_interval_ns
@@ -139,9 +154,20 @@ class Recorder:
     def _store(self) -> None:
         unflushed, self._unflushed = self._unflushed, {}
         stored = self._guarded("storing raw payloads", self._raw.flush)
-        written = self._guarded("writing the file", lambda: self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S))
-        if stored and written:
+        written = self._guarded(f"writing {self.path}", self._write)
+        if stored and written and not self._broken:
             self.flushed |= unflushed
+
+    def _write(self) -> None:
+        try:
+            self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S)
+        except RuntimeError as error:
+            if WRITER_ENDED not in str(error):
+                raise
+            free = shutil.disk_usage(self.path.parent).free
+            reason = f"only {free} bytes are free there" if free < 2**20 else "Rerun's file writer has ended"
+            self._broken = f"{self.path} takes no more data: {reason}; messages that are lost"
+            self._counts[self._broken] = 0
 
     def close(self) -> None:
         """Flush, and end the file with its footer; the second call does nothing."""
@@ -154,8 +180,9 @@ class Recorder:
             self._guarded(
                 "drawing events", lambda: self._events.tell("recorder", moment, "INFO", f"the run ended: {names}")
             )
-        self._guarded("drawing space", self._space.finish)
-        self.flush()
+        if not self._broken:
+            self._guarded("drawing space", self._space.finish)
+            self.flush()
         self._guarded("closing the file", self._stream.disconnect)
 
     def _draw(self, message: Message, arrival_ns: int) -> None:

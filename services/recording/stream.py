@@ -9,32 +9,41 @@ import json
 import os
 import platform
 import sys
+import tempfile
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
+from rerun.chunk import RrdReader
 
 from lsu_mesh.mesh.config import Configuration
 from services.recording.blueprint import blueprint
+from services.recording.mend import mend
 from services.recording.names import Names
 
 PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "rerun-sdk")
 
 
 def open_stream(
-    names: Names, path: Path, run_properties: Mapping[str, str], serve_port: int | None = None
+    names: Names,
+    path: Path,
+    run_properties: Mapping[str, str],
+    serve_port: int | None = None,
+    continues: Path | None = None,
 ) -> rr.RecordingStream:
     """A stream into a new file, and to viewers on ``serve_port`` of the loopback where it is given.
 
-    Raises ``OSError`` where the file exists or cannot be made; a folder that is missing is made.
+    ``continues`` is an earlier part of the same recording. Raises ``OSError`` where the file exists or cannot be made;
+    a folder that is missing is made.
     """
     _claim(path)
     rr.set_strict_mode(True)  # an error is an exception, which the recorder counts; else data vanish with a warning
     configuration = names.configuration
     stream = rr.RecordingStream(
         application_id(configuration),
-        recording_id=f"{configuration.mesh.name}-{os.urandom(8).hex()}",
+        recording_id=(continues and recording_id(continues)) or f"{configuration.mesh.name}-{os.urandom(8).hex()}",
         batcher_config=rr.ChunkBatcherConfig(flush_tick=configuration.recorder.flush),
     )
     sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(path)]
@@ -45,6 +54,26 @@ def open_stream(
     properties: dict[str, Any] = run_description(configuration) | dict(run_properties)
     stream.send_property("lsu_mesh", rr.AnyValues(**properties))
     return stream
+
+
+def recording_id(path: Path) -> str | None:
+    """Identifier of the recording in a file, also in one cut short; ``None`` where there is none."""
+    try:
+        try:
+            return _recording_id(path)
+        except RuntimeError:
+            with tempfile.TemporaryDirectory(prefix="part-") as folder:
+                mend([path], Path(folder) / "mended.rrd")
+                return _recording_id(Path(folder) / "mended.rrd")
+    except (OSError, ValueError):
+        return None
+
+
+def _recording_id(path: Path) -> str | None:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="RRD file has no footer")
+        recordings = RrdReader(path).recordings()
+    return str(recordings[0].recording_id) if recordings else None
 
 
 def application_id(configuration: Configuration) -> str:

@@ -10,9 +10,14 @@ from pathlib import Path
 
 import pytest
 from headless_viewer import HeadlessViewer, why_not
-from made_up_mesh import written
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from made_up_mesh import MadeUpMesh, written
 
+from services.recording.mend import mend
 from services.recording.read import read_raw
+from services.recording.recorder import Recorder
+from services.recording.stream import next_part
 
 WRITER = """
 import sys, time
@@ -73,6 +78,51 @@ def test_nothing_that_was_flushed_is_lost(flushes: int, tmp_path: Path) -> None:
     gap = 0.2 + 0.3  # the flush interval, and a busy machine
     span = (truths[-1].arrival_ns - truths[0].arrival_ns) / len(truths) / 1e9
     assert (recorded - flushed) * span <= gap
+
+
+@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(share=st.floats(0.3, 1.0, exclude_max=True))
+def test_a_file_cut_anywhere_gives_what_was_whole(
+    share: float, tmp_path_factory: pytest.TempPathFactory, whole_recording: Path
+) -> None:
+    everything = read_raw(whole_recording)
+    data = whole_recording.read_bytes()
+    folder = tmp_path_factory.mktemp("cut")
+    cut = folder / "cut.rrd"
+    cut.write_bytes(data[: int(share * len(data))])
+    found = read_raw(cut)
+    assert set(found) <= set(everything)
+    assert len(found) >= 0.5 * share * len(everything) - 100
+    mend([cut], cut)
+    assert read_raw(cut) == found
+    assert [entry.name for entry in folder.iterdir()] == ["cut.rrd"]
+
+
+def test_parts_are_joined(tmp_path: Path) -> None:
+    configuration = written(tmp_path, 2, 2)
+    mesh, parts = MadeUpMesh(configuration), []
+    for number in (1, 2):
+        parts.append(next_part(tmp_path / "run.rrd"))
+        recorder = Recorder(configuration, parts[-1], continues=parts[0] if number > 1 else None)
+        for arrival in mesh.run(20):
+            recorder.record(*arrival)
+        recorder.close()
+    mend(parts, tmp_path / "joined.rrd")
+    assert [part.name for part in parts] == ["run.rrd", "run.part2.rrd"]
+    assert len(read_raw(parts[1])) > 100
+    assert read_raw(tmp_path / "joined.rrd") == read_raw(parts[0]) + read_raw(parts[1])
+
+
+@pytest.fixture(scope="module")
+def whole_recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("whole")
+    configuration = written(folder, 2, 2)
+    recorder = Recorder(configuration, folder / "whole.rrd")
+    for arrival in MadeUpMesh(configuration).run(200):
+        recorder.record(*arrival)
+        recorder.tick(arrival.arrival_ns)
+    recorder.close()
+    return recorder.path
 
 
 @pytest.mark.viewer

@@ -51,7 +51,7 @@ def test_refused_payloads_are_kept_apart(
 def test_a_file_that_is_no_recording(tmp_path: Path) -> None:
     other = tmp_path / "other.rrd"
     other.write_text("no recording")
-    with pytest.raises(ValueError, match=r"other\.rrd cannot be read as a recording"):
+    with pytest.raises(ValueError, match=r"other\.rrd: not a Rerun recording"):
         read_raw(other)
     with pytest.raises(FileNotFoundError):
         read_raw(tmp_path / "missing.rrd")

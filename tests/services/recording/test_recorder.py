@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
+import subprocess
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -298,6 +300,31 @@ def test_a_place_that_cannot_be_written_is_an_os_error(configuration: Configurat
         Recorder(configuration, tmp_path / "file" / "run.rrd")
     with pytest.raises(OSError, match="proc"):
         Recorder(configuration, Path("/proc/run.rrd"))
+
+
+@pytest.mark.skipif(os.geteuid() != 0 or shutil.which("mount") is None, reason="a small disk needs root")
+def test_a_full_disk_is_a_problem_that_says_so_and_stops_nothing(configuration: Configuration, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", disk], check=False).returncode != 0:
+        pytest.skip("this machine does not let tests mount a disk")
+    try:
+        recorder = Recorder(configuration, disk / "x.rrd")
+        arrivals = MadeUpMesh(configuration).run(400)
+        for arrival in arrivals:
+            recorder.record(*arrival)
+            recorder.tick(arrival.arrival_ns)
+        recorder.close()
+        (last,) = recorder.problems
+        assert last.startswith(
+            f"{recorder.path} takes no more data: only 0 bytes are free there; messages that are lost: "
+        )
+        assert int(last.rpartition(" ")[2]) > 100
+        stored = read_raw(recorder.path)
+        told = recorder.flushed[arrivals[0].key] + 1
+        assert 0 < told <= sum("/truth/" in message.key for message in stored) < 400
+    finally:
+        subprocess.run(["umount", disk], check=True)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
