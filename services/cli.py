@@ -14,6 +14,9 @@ ROLES = {
     "fusion": "intersect the posteriors of all filters",
     "recorder": "write everything into a Rerun recording",
 }
+REPRODUCIBLE = {
+    "fusion": "three filters and their fusion on P3; Bayesian transfer against the source's noise",
+}
 EXIT_CODES = """exit codes:
   0  fine, or stopped once by Ctrl-C     3  could not start
   1  failure                             4  a check or wait was not met
@@ -36,6 +39,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_router(commands)
     _add_validate(commands)
     _add_view(commands)
+    _add_reproduce(commands)
     return parser
 
 
@@ -139,6 +143,19 @@ def _add_view(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     parser = _new(commands, "view", "open a recording in the Rerun viewer")
     parser.add_argument("file", metavar="FILE.rrd", help="recording to open")
     parser.set_defaults(handler="services.commands.view")
+
+
+def _add_reproduce(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _new(
+        commands, "reproduce", "run an experiment: its tables, figures, and checks against the numbers to reach"
+    )
+    listed = "; ".join(f"{what}: {words}" for what, words in REPRODUCIBLE.items())
+    parser.add_argument("what", metavar="WHAT", choices=tuple(REPRODUCIBLE), help=listed)
+    parser.add_argument("--quick", action="store_true", help="fewer seeds and steps")
+    parser.add_argument("--json", action="store_true", help="JSON lines on stdout instead of tables")
+    parser.add_argument("--out", metavar="DIR", help="folder for CSV, Markdown and PNG files (default: only print)")
+    parser.add_argument("--seed", type=int, default=1, metavar="S", help="first seed of the simulations (default: 1)")
+    parser.set_defaults(handler="services.commands.reproduce")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

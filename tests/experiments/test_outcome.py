@@ -1,0 +1,39 @@
+"""Tables and checks of experiments: what they print."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from lsu_mesh.experiments.outcome import Check, Column, Table, percent
+
+TABLE = Table(
+    "t", "A title", (Column("name"), Column("width", ".2f"), Column("n")), [("a", 1.0, 3), ("bc", math.inf, 12)]
+)
+
+
+def test_markdown_aligns_numbers_to_the_right() -> None:
+    assert TABLE.markdown().splitlines() == [
+        "A title", "", "| name | width | n |", "| :-- | --: | --: |", "| a | 1.00 | 3 |", "| bc | ∞ | 12 |",
+    ]  # fmt: skip
+
+
+def test_the_plain_table_has_columns_of_equal_width() -> None:
+    assert TABLE.plain().splitlines() == ["A title", "name  width   n", "a      1.00   3", "bc        ∞  12"]
+
+
+def test_files_hold_unrounded_numbers() -> None:
+    assert TABLE.csv() == "name,width,n\na,1.0,3\nbc,inf,12\n"
+    assert TABLE.records()[1] == {"name": "bc", "width": None, "n": 12}
+
+
+@pytest.mark.parametrize(("share", "shown"), [(1.0, 100.0), (0.999999, 99.99), (0.5, 50.0), (0.0, 0.0)])
+def test_a_hundred_per_cent_is_exactly_that(share: float, shown: float) -> None:
+    assert percent(share) == shown
+
+
+def test_a_check_says_whether_it_is_met() -> None:
+    assert str(Check("width", 0.5, 0.4)) == "NOT MET: width = 0.5 (at most 0.4)"
+    assert str(Check("inside", 1.0, 1.0, "at least")) == "met: inside = 1 (at least 1)"
+    assert not Check("inside", math.nan, 1.0, "at least").is_met

@@ -1,0 +1,77 @@
+"""``lsu-mesh reproduce``: tables and checks on stdout, files in a folder, exit codes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from lsu_mesh.experiments import fusion, transfer
+from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table
+from services import cli
+from services.commands import reproduce
+
+
+def made(limit: float) -> Outcome:
+    def draw() -> object:
+        from lsu_mesh.experiments.transfer_figure import draw_transfer
+
+        return draw_transfer(
+            [
+                transfer.Result("S2", "LSUPB", "predictor", r, 0.5, 0.6, 0.7, 3.0, 0.8, 0.9, 1.0, 0.0, 0.0)
+                for r in (1, 2)
+            ]
+        )
+
+    table = Table("t", "A title", (Column("name"), Column("width")), [("a", 1.5)])
+    return Outcome([table], [Check("width", 1.5, limit)], {"f": draw})  # type: ignore[dict-item]
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Experiments that take no time: the first meets its check."""
+    monkeypatch.setattr(fusion, "run", lambda quick, seed: made(2.0))
+    monkeypatch.setattr(transfer, "run", lambda quick, seed: made(2.0 if quick else 1.0))
+
+
+def test_every_choice_has_its_experiments() -> None:
+    assert set(reproduce.MODULES) == set(cli.REPRODUCIBLE)
+
+
+@pytest.mark.usefixtures("small")
+def test_tables_and_checks_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["reproduce", "fusion", "--quick"]) == cli.OK
+    shown = capsys.readouterr().out
+    assert "A title" in shown
+    assert shown.count("met: width = 1.5 (at most 2)") == 2
+
+
+@pytest.mark.usefixtures("small")
+def test_a_check_that_is_not_met_is_the_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["reproduce", "fusion"]) == cli.NOT_MET
+    assert "NOT MET: width = 1.5 (at most 1)" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("small")
+def test_json_lines(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["reproduce", "fusion", "--quick", "--json"]) == cli.OK
+    row, check, *_ = map(json.loads, capsys.readouterr().out.splitlines())
+    assert row == {"type": "row", "table": "t", "name": "a", "width": 1.5}
+    assert check == {"type": "check", "what": "width", "measured": 1.5, "limit": 2.0, "sense": "at most", "met": True}
+
+
+@pytest.mark.usefixtures("small")
+def test_files_are_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["reproduce", "fusion", "--quick", "--out", str(tmp_path / "new" / "folder")]) == cli.OK
+    folder = tmp_path / "new" / "folder"
+    assert sorted(path.name for path in folder.iterdir()) == ["f.png", "t.csv", "t.md"]
+    assert (folder / "f.png").read_bytes().startswith(b"\x89PNG")
+    assert f"wrote {folder / 't.csv'}" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("small")
+def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert cli.main(["reproduce", "fusion", "--out", str(tmp_path / "file")]) == cli.USAGE
+    assert "cannot be made" in capsys.readouterr().err
