@@ -19,27 +19,27 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def absolute_row_sums(A: Array) -> Array:
-    """``Σ_j |A_ij|`` of each row, (m,), rounded up: what :func:`dual_bound` needs to know its own rounding."""
+def absolute_row_sums(A: Array, reach: Array) -> Array:
+    """``Σ_j |A_ij| reach_j`` of each row, (m,), rounded up: what :func:`dual_bound` needs to know its own rounding."""
     m, g = A.shape
     sums = np.empty(m)
     for i in range(m):
         total = 0.0
         for j in range(g):
-            total += abs(A[i, j])
+            total += abs(A[i, j]) * reach[j]
         sums[i] = up(total * (1.0 + gamma(g)))
     return sums
 
 
 @kernel
 def dual_bound(d: Array, A: Array, b: Array, row_sums: Array, y: Array) -> float:
-    """:func:`dual_bound_in` with room of its own."""
-    return dual_bound_in(d, A, b, row_sums, y, np.empty(d.size))
+    """:func:`dual_bound_in` for ``|x| ≤ 1``, with room of its own."""
+    return dual_bound_in(d, A, b, np.ones(d.size), row_sums, y, np.empty(d.size))
 
 
 @inner
-def dual_bound_in(d: Array, A: Array, b: Array, row_sums: Array, y: Array, reduced: Array) -> float:
-    """Upper bound of ``max {d'ξ : A ξ = b, |ξ|∞ ≤ 1}`` from the multipliers y (m,), rounded up.
+def dual_bound_in(d: Array, A: Array, b: Array, reach: Array, row_sums: Array, y: Array, reduced: Array) -> float:
+    """Upper bound of ``max {d'x : A x = b, |x| ≤ reach}`` from the multipliers y (m,), rounded up.
 
     d (g,), A (m, g), b (m,); ``row_sums`` from :func:`absolute_row_sums`; ``reduced`` (≥ g,) is room.
     A y that is not finite counts as 0.
@@ -55,7 +55,7 @@ def dual_bound_in(d: Array, A: Array, b: Array, row_sums: Array, y: Array, reduc
     mass = 0.0
     for j in range(g):
         reduced[j] = d[j]
-        mass += abs(d[j])
+        mass += abs(d[j]) * reach[j]
     level = 0.0
     for i in range(m):
         factor = y[i] if finite else 0.0
@@ -67,7 +67,7 @@ def dual_bound_in(d: Array, A: Array, b: Array, row_sums: Array, y: Array, reduc
             mass += abs(factor) * (row_sums[i] + abs(b[i]))
     spread = 0.0
     for j in range(g):
-        spread += abs(reduced[j])
+        spread += abs(reduced[j]) * reach[j]
     bound = level + spread
     lost = gamma(m + 4) * mass + gamma(g + 4) * (abs(level) + spread)
     return up(bound + up(lost * (1.0 + gamma(g + m + 8))))

@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound_in
+from lsu_mesh.kernels.rounding import gamma, up
 from lsu_mesh.kernels.simplex import (
+    balanced,
     basic_levels,
     canonical_tableau,
     climb,
     find_vertex,
+    refactor,
     refine_multipliers,
-    scaled_rows,
     starting_bounds,
 )
 
@@ -33,11 +35,15 @@ GAP = 1e-9
 
 
 class Program(NamedTuple):
-    """A feasible set with a vertex of it: scaled rows (m, g), their sides (m,) and absolute sums (m,), the tableau
-    (m, g + m), basis (m,), nonbasic bounds (g,), basic levels (m,), and room for multipliers (m,), costs (g + m,)."""
+    """A feasible set, balanced (see :mod:`lsu_mesh.kernels.simplex`), with a vertex of it and room to work in.
+
+    rows (m, g), sides (m,), reach (g,), absolute row sums (m,); tableau (m, g + m), basis (m,), nonbasic bounds (g,),
+    basic levels (m,); room for multipliers (m,), reduced costs (g + m,) and the scaled objective (g,).
+    """
 
     rows: Array
     sides: Array
+    reach: Array
     sums: Array
     tableau: Array
     basis: NDArray[np.int64]
@@ -45,47 +51,88 @@ class Program(NamedTuple):
     level: Array
     multipliers: Array
     costs: Array
+    objective: Array
 
 
 @kernel
 def open_program(A: Array, b: Array) -> tuple[int, Program]:
     """Find a first vertex, from a canonical basis; status ``TIGHT``, ``LOOSE`` where none was found, or ``EMPTY``."""
     m, g = A.shape
-    rows, sides = scaled_rows(A, b)
-    sums = absolute_row_sums(rows)
-    tableau, basis = canonical_tableau(rows)
-    program = Program(rows, sides, sums, tableau, basis, np.empty(g), np.empty(m), np.zeros(m), np.empty(g + m))
-    starting_bounds(tableau, sides, basis, program.at, program.level)
+    rows, sides, reach = balanced(A, b)
+    tableau, basis = canonical_tableau(rows, reach)
+    program = Program(
+        rows, sides, reach, absolute_row_sums(rows, reach), tableau, basis,
+        np.empty(g), np.empty(m), np.zeros(m), np.empty(g + m), np.empty(g),
+    )  # fmt: skip
+    starting_bounds(tableau, sides, basis, reach, program.at, program.level)
     if _contradicts(program):
         return EMPTY, program
-    found = find_vertex(tableau, basis, program.at, program.level, program.multipliers)
+    found = find_vertex(tableau, basis, reach, program.at, program.level, program.multipliers)
     if _farkas(program, program.multipliers):
         return EMPTY, program
+    if not found:
+        found = _start_again(program)
     return (TIGHT if found else LOOSE), program
+
+
+@inner
+def _start_again(program: Program) -> bool:
+    """Factorise the basis anew and look for a feasible vertex from there."""
+    refactor(program.rows, program.tableau, program.basis)
+    basic_levels(program.tableau, program.sides, program.basis, program.at, program.level)
+    return find_vertex(program.tableau, program.basis, program.reach, program.at, program.level, program.multipliers)
 
 
 @inner
 def maximise(program: Program, d: Array, point: Array) -> tuple[float, bool]:
     """Safe upper bound of ``max d'ξ`` and whether ``point`` (g,), which is written, attains it to rounding.
 
-    Starts from the vertex where the program stands and leaves it at the new one.
+    Starts from the vertex where the program stands and leaves it at the new one. Where the bound is loose the basis is
+    factorised anew and the rest of the way climbed once more.
     """
-    m, g = program.rows.shape
+    for j in range(d.size):
+        program.objective[j] = d[j] / program.reach[j]
+    value, tight = _climb_to(program, d, point)
+    if not tight:
+        _start_again(program)
+        again, tight = _climb_to(program, d, point)
+        value = min(value, again)
+    if np.isfinite(value):
+        return value, tight
+    box = 0.0
+    for j in range(d.size):
+        box += abs(d[j])
+    return up(box * (1.0 + gamma(d.size))), False
+
+
+@inner
+def _climb_to(program: Program, d: Array, point: Array) -> tuple[float, bool]:
+    g = d.size
+    y = program.multipliers
     basic_levels(program.tableau, program.sides, program.basis, program.at, program.level)
-    done = climb(program.tableau, program.basis, program.at, program.level, d, program.costs, program.multipliers)
-    refine_multipliers(program.rows, program.tableau, program.basis, d, program.multipliers)
-    value = dual_bound_in(d, program.rows, program.sides, program.sums, program.multipliers, program.costs)
-    for j in range(g):
-        point[j] = program.at[j]
-    for i in range(m):
-        if program.basis[i] >= 0:
-            point[program.basis[i]] = program.level[i]
+    done = climb(
+        program.tableau, program.basis, program.reach, program.at, program.level, program.objective, program.costs, y
+    )
+    refine_multipliers(program.rows, program.tableau, program.basis, program.objective, y)
+    value = dual_bound_in(program.objective, program.rows, program.sides, program.reach, program.sums, y, program.costs)
+    vertex(program, point)
     reached = 0.0
     size = 0.0
     for j in range(g):
         reached += d[j] * point[j]
         size += abs(d[j])
     return value, done and value - reached <= GAP * size + 1e-290
+
+
+@inner
+def vertex(program: Program, point: Array) -> None:
+    """The ξ (g,) where the program stands."""
+    for j in range(point.size):
+        point[j] = program.at[j] / program.reach[j]
+    for i in range(program.basis.size):
+        j = program.basis[i]
+        if j >= 0:
+            point[j] = program.level[i] / program.reach[j]
 
 
 @kernel
@@ -157,7 +204,10 @@ def _contradicts(program: Program) -> bool:
             sign = -1.0 if program.level[i] > 0.0 else 1.0
             for k in range(m):
                 y[k] = sign * program.tableau[i, g + k]
-            if dual_bound_in(np.zeros(g), program.rows, program.sides, program.sums, y, program.costs) < 0.0:
+            if (
+                dual_bound_in(np.zeros(g), program.rows, program.sides, program.reach, program.sums, y, program.costs)
+                < 0.0
+            ):
                 return True
     return False
 
@@ -173,4 +223,7 @@ def _farkas(program: Program, sigma: Array) -> bool:
             some = True
             for k in range(m):
                 y[k] -= sigma[i] * program.tableau[i, g + k]
-    return some and dual_bound_in(np.zeros(g), program.rows, program.sides, program.sums, y, program.costs) < 0.0
+    return (
+        some
+        and dual_bound_in(np.zeros(g), program.rows, program.sides, program.reach, program.sums, y, program.costs) < 0.0
+    )

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.compile import inlined, inner, kernel
-from lsu_mesh.kernels.hull import Program
+from lsu_mesh.kernels.hull import Program, vertex
 from lsu_mesh.kernels.simplex import basic_levels, climb
 
 Array = NDArray[np.float64]
@@ -23,13 +23,14 @@ CONFIRMED = 1e-9
 @inner
 def farthest(program: Program, d: Array, point: Array) -> None:
     """A vertex ξ (g,) that maximises ``d'ξ``, in floating point; the program is left there."""
+    for j in range(d.size):
+        program.objective[j] = d[j] / program.reach[j]
     basic_levels(program.tableau, program.sides, program.basis, program.at, program.level)
-    climb(program.tableau, program.basis, program.at, program.level, d, program.costs, program.multipliers)
-    for j in range(point.size):
-        point[j] = program.at[j]
-    for i in range(program.basis.size):
-        if program.basis[i] >= 0:
-            point[program.basis[i]] = program.level[i]
+    climb(
+        program.tableau, program.basis, program.reach, program.at, program.level,
+        program.objective, program.costs, program.multipliers,
+    )  # fmt: skip
+    vertex(program, point)
 
 
 @kernel

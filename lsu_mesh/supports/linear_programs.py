@@ -39,7 +39,7 @@ def program_maxima(status: int, program: Program, objectives: Matrix, A: Matrix,
     if LOOSE in (status, solved):
         if _highs_proves_empty(A, b):
             return Maxima(values, points, True)
-        sums = absolute_row_sums(A)
+        sums = absolute_row_sums(A, np.ones(A.shape[1]))
         for i, d in enumerate(objectives):
             multipliers, point = _highs(d, A, b)
             bound = dual_bound(np.array(d), A, b, sums, multipliers)
@@ -80,4 +80,4 @@ def _highs_proves_empty(A: Matrix, b: Vector) -> bool:
     if answer.status != 0:
         return False
     ray = np.array(-answer.eqlin.marginals / scale)
-    return bool(dual_bound(np.zeros(g), A, b, absolute_row_sums(A), ray) < 0.0)
+    return bool(dual_bound(np.zeros(g), A, b, absolute_row_sums(A, np.ones(A.shape[1])), ray) < 0.0)
