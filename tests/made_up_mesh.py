@@ -35,13 +35,13 @@ class Arrival(NamedTuple):
     message: Message
 
 
-def written(folder: Path, states: int = 3, filters: int = 3, extra: str = "") -> Configuration:
+def written(folder: Path, states: int = 3, filters: int = 3, dt: float = 0.02) -> Configuration:
     """A configuration with so many states and filters, one sensor per state (six at most), and one fusion."""
     n = states
     sensors = [f"s{k + 1}" for k in range(min(n, 6))]
     names = [f"f{j + 1}" for j in range(filters)]
     lines = [
-        f'[mesh]\nname = "made-up"\ndt = 0.02\nsteps = 600\nseed = 1\n[model]\nA = {np.eye(n).tolist()}',
+        f'[mesh]\nname = "made-up"\ndt = {dt}\nsteps = 600\nseed = 1\n[model]\nA = {np.eye(n).tolist()}',
         f"rho = {[0.1] * n}\nstates = {list(GREEK[:n])}\nunits = {['m'] * n}".replace("'", '"'),
         f"[model.prior]\nlower = {[-5.0] * n}\nupper = {[5.0] * n}\n[plant]",
     ]
@@ -51,7 +51,7 @@ def written(folder: Path, states: int = 3, filters: int = 3, extra: str = "") ->
         lines.append(f'[filters.{name}]\nkind = "{KINDS[j % 3]}"\nsensors = {sensors}'.replace("'", '"'))
     lines.append(f"[fusion.main]\nsources = {names}".replace("'", '"'))
     path = folder / "mesh.toml"
-    path.write_text("\n".join([*lines, extra]))
+    path.write_text("\n".join(lines))
     return load(path)
 
 

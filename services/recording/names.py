@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import rerun as rr
 
@@ -34,6 +35,7 @@ from lsu_mesh.mesh.config.settings import SensorSettings
 from lsu_mesh.mesh.messages import Measurement, Message, Posterior, Prediction, Truth
 
 
+@lru_cache(maxsize=4096)
 def path(*parts: str) -> str:
     """Entity path of the parts, each escaped."""
     return str(rr.new_entity_path(list(parts)))
