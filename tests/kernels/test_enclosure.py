@@ -16,18 +16,31 @@ from lsu_mesh.kernels.scratch import scratch
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
 
 
-def corners(T: np.ndarray, G: np.ndarray, widths: np.ndarray, delta: np.ndarray, rng: np.random.Generator) -> list[list[Fraction]]:
+def corners(
+    T: np.ndarray, G: np.ndarray, widths: np.ndarray, delta: np.ndarray, rng: np.random.Generator
+) -> list[list[Fraction]]:
     """Some exact vertices of ``T ⊕ G diag(widths) ⊕ box(delta)``."""
     generators = [[Fraction(v) for v in column] for column in T.T.tolist()]
-    generators += [[Fraction(v) * Fraction(w) for v in column] for column, w in zip(G.T.tolist(), widths.tolist(), strict=True)]
-    generators += [[Fraction(d) if i == j else Fraction(0) for i in range(len(delta))] for j, d in enumerate(delta.tolist())]
+    generators += [
+        [Fraction(v) * Fraction(w) for v in column] for column, w in zip(G.T.tolist(), widths.tolist(), strict=True)
+    ]
+    generators += [
+        [Fraction(d) if i == j else Fraction(0) for i in range(len(delta))] for j, d in enumerate(delta.tolist())
+    ]
     signs = list(itertools.islice(itertools.product((-1, 1), repeat=len(generators)), 16))
     signs += [tuple(rng.choice([-1, 1], len(generators)).tolist()) for _ in range(30)]
-    return [[sum((g[i] * e for g, e in zip(generators, row, strict=True)), Fraction(0)) for i in range(len(delta))] for row in signs]
+    return [
+        [sum((g[i] * e for g, e in zip(generators, row, strict=True)), Fraction(0)) for i in range(len(delta))]
+        for row in signs
+    ]
 
 
 @settings(max_examples=120, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 5), kind=st.sampled_from(["full", "thin", "singular", "zero", "flat box"]))
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n=st.integers(1, 5),
+    kind=st.sampled_from(["full", "thin", "singular", "zero", "flat box"]),
+)
 def test_every_vertex_lies_inside(seed: int, n: int, kind: str) -> None:
     rng = np.random.default_rng(seed)
     T, q = rng.normal(size=(n, n)), int(rng.integers(0, 4))

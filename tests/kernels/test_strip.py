@@ -79,9 +79,7 @@ def test_empty_is_said_exactly_where_the_linear_program_is_infeasible() -> None:
     for _ in range(200):
         case = random_cut(rng, int(rng.integers(1, 6)), offset=2.0)
         g, s = case.p @ case.T, case.p @ case.c
-        program = linprog(
-            np.zeros(len(g)), A_ub=np.vstack([g, -g]), b_ub=[case.hi - s, s - case.lo], bounds=(-1, 1)
-        )
+        program = linprog(np.zeros(len(g)), A_ub=np.vstack([g, -g]), b_ub=[case.hi - s, s - case.lo], bounds=(-1, 1))
         assert (case.status == strip.EMPTY) == (program.status == 2)
         empty += case.status == strip.EMPTY
     assert 20 < empty < 100
@@ -95,7 +93,10 @@ def test_no_point_of_the_set_in_the_strip_is_lost(seed: int, n: int, exponent: i
     c, T, p = rng.normal(size=n), rng.normal(size=(n, n)), rng.normal(size=n)
     T[:, -1] *= 0.0 if flat else 10.0**exponent
     corner = [Fraction(int(v)) for v in rng.choice([-1, 1], n)]
-    x = [Fraction(a) + sum(Fraction(t) * v for t, v in zip(row, corner, strict=True)) for a, row in zip(c.tolist(), T.tolist(), strict=True)]
+    x = [
+        Fraction(a) + sum(Fraction(t) * v for t, v in zip(row, corner, strict=True))
+        for a, row in zip(c.tolist(), T.tolist(), strict=True)
+    ]
     value = sum((Fraction(a) * v for a, v in zip(p.tolist(), x, strict=True)), Fraction(0))
     hi = np.nextafter(float(value), np.inf)
     lo = hi - abs(rng.normal())
@@ -148,7 +149,10 @@ def test_a_tightened_box_is_the_hull_of_box_and_strip(seed: int, n: int) -> None
         ends = [
             sign
             * linprog(
-                sign * np.eye(n)[j], A_ub=np.vstack([p, -p]), b_ub=[hi, -lo], bounds=list(zip(lower, upper, strict=True))
+                sign * np.eye(n)[j],
+                A_ub=np.vstack([p, -p]),
+                b_ub=[hi, -lo],
+                bounds=list(zip(lower, upper, strict=True)),
             ).fun
             for sign in (1, -1)
         ]
