@@ -40,6 +40,8 @@ REHEARSED_STEPS = 6
 """So many steps bring a limited complexity into play."""
 BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
+MOST_USED = 2048
+"""So many references since the last publication and a step is published all the same: receivers refuse endless lists."""
 
 
 @dataclass
@@ -283,7 +285,8 @@ class Estimator(Node):
             self._restarted = False
         self._used = (*self._used, *combined.used)
         is_first = step.published is None
-        if is_first and self._is_behind() and combined.status in ("ok", "predicted"):
+        may_skip = combined.status in ("ok", "predicted") and len(self._used) < MOST_USED
+        if is_first and self._is_behind() and may_skip:
             self._counts["behind"] += 1
             return messages
         posterior = self._publish(k, step, combined, now)
