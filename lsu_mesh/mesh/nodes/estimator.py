@@ -41,7 +41,7 @@ REHEARSED_STEPS = 6
 BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
 MOST_USED = 2048
-"""So many references since the last publication and a step is published all the same: receivers refuse endless lists."""
+"""So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
 
 
 @dataclass
