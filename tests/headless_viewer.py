@@ -11,7 +11,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -38,7 +39,7 @@ class HeadlessViewer:
 
     def __init__(self) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="viewer-")
-        self._port = _free_port()
+        self._port = free_port()
         self._process: subprocess.Popen[bytes] | None = None
         self._client: ViewerClient | None = None
         self._started = 0.0
@@ -74,16 +75,30 @@ class HeadlessViewer:
 
     def open(self, path: Path) -> None:
         """Open a recording and wait until it is loaded."""
+        self.follow(str(path.resolve()))
+
+    def follow(self, url: str) -> None:
+        """Open a file or a running recorder, and wait until something is there."""
         client = self._require_client()
         logs = client.get_logs()
         self._heard = logs[-1].sequence if logs else None
-        client.open(str(path.resolve()))
+        client.open(url)
 
         def is_loaded() -> bool:
             state = client.get_state()
-            return bool(state.active_recording and not state.loading and state.views)
+            return bool(state.active_recording and state.views and (url.startswith("rerun+") or not state.loading))
 
-        self._wait(f"{path} is loaded", is_loaded)
+        self._wait(f"{url} is loaded", is_loaded)
+
+    @contextmanager
+    def frozen(self) -> Iterator[None]:
+        """Stop the viewer's process for a while."""
+        assert self._process is not None
+        os.killpg(self._process.pid, signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            os.killpg(self._process.pid, signal.SIGCONT)
 
     def tabs(self) -> list[str]:
         """Names of the tabs of the outermost container."""
@@ -172,7 +187,8 @@ def _rerun() -> str:
     return str(Path(sys.executable).with_name("rerun"))
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port of the loopback on which nobody listens now."""
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return int(one.getsockname()[1])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 import subprocess
 import warnings
@@ -370,6 +371,18 @@ def test_no_network_is_opened_unless_asked(configuration: Configuration, tmp_pat
     recorder = Recorder(configuration, tmp_path / "x.rrd")
     assert listening() == before
     recorder.close()
+
+
+def test_every_entity_is_documented(configuration: Configuration, root: Path, record: Record) -> None:
+    arrivals = MadeUpMesh(configuration).run(5)
+    path = record(configuration, arrivals)
+    listed = re.findall(r"`(/[a-z_/<>]+)`", (root / "docs" / "recording.md").read_text())
+    patterns = [re.compile(re.sub("<[a-z]+>", "[^/]+", entry)) for entry in listed]
+    entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
+    unknown = [e for e in entities if not e.startswith("/__properties") and not any(p.fullmatch(e) for p in patterns)]
+    assert unknown == []
+    unused = [p.pattern for p in patterns if not any(p.fullmatch(e) for e in entities)]
+    assert set(unused) <= {"/raw/refused"}
 
 
 @pytest.mark.parametrize(("states", "filters"), [(1, 1), (2, 12), (12, 2)])

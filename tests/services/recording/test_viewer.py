@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,13 +10,14 @@ import numpy as np
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
-from headless_viewer import HeadlessViewer, why_not
+from headless_viewer import HeadlessViewer, free_port, why_not
 from made_up_mesh import START_NS, STEP_NS, MadeUpMesh, written
 from PIL import Image
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Event
 from services.recording.palette import TRUTH, Color, colors
+from services.recording.read import read_raw
 from services.recording.recorder import Recorder
 
 pytestmark = [
@@ -101,6 +103,37 @@ def pictures(viewer: HeadlessViewer, tabs: list[str], folder: Path) -> dict[str,
         viewer.show(tab)
         viewer.picture(picture)
     return taken
+
+
+def test_a_viewer_that_follows_and_freezes_disturbs_nothing(viewer: HeadlessViewer, tmp_path: Path) -> None:
+    configuration = written(tmp_path, 2, 2)
+    port = free_port()
+    recorder, mesh = Recorder(configuration, tmp_path / "live.rrd", serve_port=port), MadeUpMesh(configuration)
+
+    def go_on(steps: range) -> float:
+        """The longest time that a step took."""
+        longest = 0.0
+        for k in steps:
+            began = time.perf_counter()
+            for arrival in mesh.step(k):
+                recorder.record(*arrival)
+            recorder.tick(arrival.arrival_ns)
+            longest = max(longest, time.perf_counter() - began)
+            time.sleep(0.01)
+        return longest
+
+    go_on(range(1, 60))
+    viewer.follow(f"rerun+http://127.0.0.1:{port}/proxy")
+    go_on(range(60, 120))
+    viewer.picture(tmp_path / "live.png")
+    assert viewer.last_step() > 60
+    assert viewer.complaints() == []
+    assert pixels(tmp_path / "live.png", colors(configuration)["main"], 0.4) > 1000
+    with viewer.frozen():
+        assert go_on(range(120, 320)) < 1.0
+    recorder.close()
+    assert recorder.problems == []
+    assert sum("/truth/" in message.key for message in read_raw(recorder.path)) == 319
 
 
 def test_the_viewer_does_complain_of_a_broken_recording(viewer: HeadlessViewer, tmp_path: Path) -> None:
