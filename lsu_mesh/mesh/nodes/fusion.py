@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from msgspec import structs
 
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
+from lsu_mesh.mesh.messages import Fused, Health, Input, Message, Posterior, Rejection, SupportMessage
 from lsu_mesh.mesh.nodes.estimator import Combined, Estimator, Status, Step, finite_or_none
 from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.nodes.quarantine import Quarantine, Say
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
 
 About = dict[str, str | int | float | None]
+MOST_FAMILIES = 64
+"""So many families of contradicting sources are tried, the largest first, to find out whom to leave out."""
 SILENT_STEPS = 5
 """After so many steps without any message, a second at least, the fusion goes on by the clock."""
 
@@ -47,33 +52,6 @@ class Outcome:
     messages: list[Message] = field(default_factory=list)
 
 
-class Quarantine:
-    """Names the sources that are left out again and again.
-
-    It changes no set: a quarantined source still counts among the m of which ``faults`` may lie, because it may be
-    right again while another one begins to lie.
-    """
-
-    def __init__(self, sources: Sequence[str], after: int) -> None:
-        self._after = after
-        self._run = dict.fromkeys(sources, 0)
-        """Steps in a row that a source was left out (positive) or agreed (negative)."""
-        self.members: set[str] = set()
-
-    def note(self, left_out: set[str], say: Callable[[str, bool], Message]) -> list[Message]:
-        """Count one step; the events of who goes in and who comes out."""
-        messages = []
-        for name, run in self._run.items():
-            self._run[name] = max(run, 0) + 1 if name in left_out else min(run, 0) - 1
-            if self._run[name] >= self._after and name not in self.members:
-                self.members.add(name)
-                messages.append(say(name, True))
-            elif self._run[name] <= -self._after and name in self.members:
-                self.members.remove(name)
-                messages.append(say(name, False))
-        return messages
-
-
 class FusionNode(Estimator):
     """``fused_k = ∩ posteriors_k ∩ (own prediction of k)`` as a constrained zonotope of limited complexity."""
 
@@ -92,7 +70,9 @@ class FusionNode(Estimator):
         self._met: tuple[Vector, Vector] = engine.bounds()
         """Bounds of the set met with those of every accepted source."""
         self._rejected: list[Rejection] = []
-        self._quarantine = Quarantine(self.sources, self.settings.quarantine_after)
+        self._quarantine = Quarantine(self.sources, self.settings.quarantine_after, self.settings.max_lag)
+        self._told: set[tuple[int, str]] = set()
+        """Steps and sources whose contradiction was told; a step that is done again does not tell it again."""
         self._counts["silent steps"] = 0
         self.last: dict[str, Posterior] = {}
         """Last sound posterior of each source, for those that ask for it."""
@@ -162,7 +142,9 @@ class FusionNode(Estimator):
         elif self.settings.policy == "intersect" and sources:
             outcome = self._intersected(k, sources, now)
         else:
-            return Combined("predicted", [], missing, None), []
+            outcome = Outcome("predicted", [])
+        agreeing = sources if outcome.status != "inconsistent" else []
+        messages = [*outcome.messages, *self._note_rejected(k, agreeing, now)]
         for source in outcome.used:
             if self.settings.policy == "intersect":
                 self.rely(source.message)
@@ -170,7 +152,7 @@ class FusionNode(Estimator):
                 self.weaken(source.message.guarantee)
         origin = min((source.message.origin_ns for source in outcome.used), default=None)
         used = [source.message.reference for source in outcome.used]
-        return Combined(outcome.status, used, missing, origin, outcome.cause), outcome.messages
+        return Combined(outcome.status, used, missing, origin, outcome.cause), messages
 
     def _sound_sources(self, step: Step) -> list[Source]:
         sources = []
@@ -196,7 +178,7 @@ class FusionNode(Estimator):
             return self._without_prediction(k, sources, now)
         self.engine.restore(before)
         self._met = met
-        accepted = [source for source in sources if self._try(source)]
+        accepted = self._largest_family(sources)
         messages = self._name_rejected(k, [source for source in sources if source not in accepted], now)
         return Outcome("ok" if accepted else "inconsistent", accepted, "sources contradict one another", messages)
 
@@ -252,6 +234,17 @@ class FusionNode(Estimator):
         self._met = (lower, upper)
         return True
 
+    def _largest_family(self, sources: Sequence[Source]) -> Sequence[Source]:
+        """Meet the set with as many sources as have a point in common with it, the first by name of equal size."""
+        before, met = self.engine.snapshot(), self._met
+        families = (f for size in range(len(sources) - 1, 0, -1) for f in itertools.combinations(sources, size))
+        for family in itertools.islice(families, MOST_FAMILIES):
+            if self._try_all(family):
+                return family
+            self.engine.restore(before)
+            self._met = met
+        return [source for source in sources if self._try(source)]
+
     def _restart(self, sources: Sequence[Source]) -> bool:
         """Drop the own prediction and hold what the sources alone say; False where they contradict one another."""
         first, *others = sources
@@ -260,27 +253,44 @@ class FusionNode(Estimator):
         return self._try_all(others)
 
     def _name_rejected(self, k: int, rejected: Sequence[Source], now: int) -> list[Message]:
-        """Events and counts of the sources that were left out; who is left out often is quarantined."""
+        """Events and counts of the sources that contradict the others."""
         messages: list[Message] = []
-        names = {source.name for source in rejected}
-        for name in sorted(names):
+        self._told = {(step, name) for step, name in self._told if step >= k - self.history}
+        for name in sorted(source.name for source in rejected):
             reason = "contradicts what the other sources and the own prediction agree on"
             self._rejected.append(Rejection(source=name, reason=reason))
+            if (k, name) in self._told:
+                continue
+            self._told.add((k, name))
             self._counts["contradictions"] += 1
             text = f"step {k}: {name} {reason}; left out"
             messages.append(self.event("WARN", "source-rejected", text, now, k, {"source": name, "step": k}))
-        return [*messages, *self._quarantine.note(names, self._say_quarantine(k, now))]
+        return messages
 
-    def _say_quarantine(self, k: int, now: int) -> Callable[[str, bool], Message]:
+    def _note_rejected(self, k: int, agreeing: Sequence[Source], now: int) -> list[Message]:
+        """Events of who is quarantined, left out too often for whatever reason, and of who is let back in."""
+        left_out = {rejection.source for rejection in self._rejected}
+        agreed = {source.name for source in agreeing} - left_out
+        return self._quarantine.note(k, left_out, agreed, self._say_quarantine(k, now))
+
+    def _say_quarantine(self, k: int, now: int) -> Say:
         def say(name: str, is_in: bool) -> Message:
             count = self.settings.quarantine_after
             if is_in:
-                text = f"step {k}: {name} was left out {count} times in a row and is quarantined"
+                text = f"step {k}: {name} was left out {count} times and is quarantined"
                 return self.event("ERROR", "quarantined", text, now, k, {"source": name, "step": k})
             text = f"step {k}: {name} has agreed {count} times in a row and is let back in"
             return self.event("INFO", "let-back-in", text, now, k, {"source": name, "step": k})
 
         return say
+
+    def health(self, now: int) -> Health:
+        """How the fusion does now; names who is quarantined."""
+        health = super().health(now)
+        if not self._quarantine.members:
+            return health
+        reasons = [*health.reasons, f"quarantined: {', '.join(sorted(self._quarantine.members))}"]
+        return structs.replace(health, level="WARN", reasons=reasons)
 
     # -- messages out
 
