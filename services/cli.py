@@ -40,6 +40,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_validate(commands)
     _add_view(commands)
     _add_reproduce(commands)
+    _add_bench(commands)
     return parser
 
 
@@ -156,6 +157,15 @@ def _add_reproduce(commands: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--out", metavar="DIR", help="folder for CSV, Markdown and PNG files (default: only print)")
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="first seed of the simulations (default: 1)")
     parser.set_defaults(handler="services.commands.reproduce")
+
+
+def _add_bench(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = _new(commands, "bench", "measure speed beside other libraries, as ratios in one run on one core")
+    parser.add_argument("what", choices=("kernels",), help="kernels: steps of filters, hulls, banks, a new process")
+    parser.add_argument("--quick", action="store_true", help="few sizes and rounds: shows that it works, not how fast")
+    parser.add_argument("--out", metavar="DIR", help="folder for the figure and the JSON file (needs matplotlib)")
+    parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of tables")
+    parser.set_defaults(handler="services.commands.bench")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

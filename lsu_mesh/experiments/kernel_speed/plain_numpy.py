@@ -1,4 +1,4 @@
-"""LSUO and LSUP as one writes them in NumPy: vectorised over the states, one strip after the other, not rounded outward.
+"""LSUO and LSUP as one writes them in NumPy: vectorised over states, one strip after the other, not rounded outward.
 
 They do per row of data what :func:`~lsu_mesh.filters.run.run_filter` does: output prediction, data update, interval
 hull, volume, time update. Agreement with the compiled filters, up to what those add for rounding, is tested.

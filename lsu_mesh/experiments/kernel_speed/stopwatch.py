@@ -1,4 +1,8 @@
-"""Times of competing programs on one core: taken in turns, so that the noise of a shared machine hits all alike."""
+"""Times of competing programs on one core.
+
+They run in turns, so that the noise of a shared machine hits all alike, and the clock is the processor time of this
+process, all threads together: on one core that is the wall clock of an idle machine.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +40,7 @@ def one_core() -> Iterator[int | None]:
 
 
 def compare(candidates: Mapping[str, Candidate], rounds: int, seconds: float) -> dict[str, float]:
-    """Median seconds per unit of each candidate over ``rounds`` rounds; in a round each runs for about ``seconds``."""
+    """Median processor seconds per unit of each candidate over the rounds; it runs about ``seconds`` in each."""
     calls = {name: _calls(candidate, seconds) for name, candidate in candidates.items()}
     times: dict[str, list[float]] = {name: [] for name in candidates}
     collecting = gc.isenabled()
@@ -65,7 +69,7 @@ def _calls(candidate: Candidate, seconds: float) -> int:
 
 def _seconds(candidate: Candidate, calls: int) -> float:
     run = candidate.run
-    began = time.perf_counter()
+    began = time.process_time()
     for _ in range(calls):
         run()
-    return time.perf_counter() - began
+    return time.process_time() - began
