@@ -84,6 +84,8 @@ def _states_of(names: Names, peer: str) -> Part:
     """Band and error of every state, side by side where there is room, else in tabs."""
     count = len(names.states)
     bands = [_bands(names, i, peer) for i in range(count)]
+    if not names.truth_is_known:
+        return _grid("Bands", bands)
     errors = [_errors(names, i, peer) for i in range(count)]
     if count <= 4:
         return rrb.Grid(*(view for pair in zip(bands, errors, strict=True) for view in pair), grid_columns=2)
@@ -116,9 +118,14 @@ def _grid(name: str, views: Sequence[Part]) -> Part:
 def _bands(names: Names, state: int, peer: str | None = None) -> Part:
     part = names.states[state]
     shown = f"{path('bands', part)}/**" if peer is None else path("bands", part, peer)
-    title = names.label(state) if peer else f"{names.label(state)}: truth (pink), bounds of all peers"
+    title = names.label(state) if peer else f"{names.label(state)}: {_truth(names)}bounds of all peers"
     crowded = [] if peer else [path("bands", part, name) for name in _outlined(names)]
     return _plot(names, title, [shown, path("truth", part)], legend=peer is not None and state == 0, outlined=crowded)
+
+
+def _truth(names: Names) -> str:
+    """What titles say of the truth."""
+    return "truth (pink), " if names.truth_is_known else ""
 
 
 def _outlined(names: Names) -> list[str]:
@@ -196,7 +203,7 @@ def _sets_of_all(names: Names) -> list[str]:
 def _space(names: Names, name: str, sets: list[str]) -> Part:
     axes = [names.states[axis] for axis in names.axes()]
     origin = frame.entity(name)
-    title = f"Truth (pink) in the sets of {', '.join(axes)}"
+    title = f"{_truth(names)}sets of {', '.join(axes)}"
     if len(axes) < 3:  # from the top
         height = 0.0 if len(axes) == 2 else 0.5 * frame.LANE * (len(names.estimators) + 1)
         position, target = (0.0, height, max(2.8, 2.5 * height)), (0.0, height, 0.0)

@@ -21,9 +21,8 @@ class Events:
 
     def add(self, message: Event, moment: Moment) -> None:
         """An event that a peer told."""
-        about = ", ".join(f"{key} {value}" for key, value in message.about.items())
-        text = f"{message.code}: {message.text}" + (f" ({about})" if about else "")
-        self.tell(message.name, moment, message.level, text)
+        text = message.text.removeprefix(f"step {moment.step}: ")
+        self.tell(message.name, moment, message.level, f"{message.code}: {text}")
 
     def tell(self, peer: str, moment: Moment, level: str, text: str) -> None:
         """A line of text about a peer."""

@@ -84,6 +84,11 @@ class Names:
         listed = [output for sensor in configuration.sensors.values() for output in outputs_of(sensor)]
         object.__setattr__(self, "outputs", tuple(listed))
 
+    @property
+    def truth_is_known(self) -> bool:
+        """Whether there is a simulated plant; real measurements come without the truth."""
+        return self.configuration.plant is not None
+
     def check(self, message: Message) -> None:
         """Raise ``ValueError`` where a message does not fit the mesh: it would spoil the batch of the others."""
         states = len(self.states)
