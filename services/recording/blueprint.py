@@ -118,14 +118,10 @@ def _grid(name: str, views: Sequence[Part]) -> Part:
 def _bands(names: Names, state: int, peer: str | None = None) -> Part:
     part = names.states[state]
     shown = f"{path('bands', part)}/**" if peer is None else path("bands", part, peer)
-    title = names.label(state) if peer else f"{names.label(state)}: {_truth(names)}bounds of all peers"
+    seen = "truth (pink), bounds of all peers" if names.truth_is_known else "bounds of all peers"
+    title = names.label(state) if peer else f"{names.label(state)}: {seen}"
     crowded = [] if peer else [path("bands", part, name) for name in _outlined(names)]
     return _plot(names, title, [shown, path("truth", part)], legend=peer is not None and state == 0, outlined=crowded)
-
-
-def _truth(names: Names) -> str:
-    """What titles say of the truth."""
-    return "truth (pink), " if names.truth_is_known else ""
 
 
 def _outlined(names: Names) -> list[str]:
@@ -203,7 +199,7 @@ def _sets_of_all(names: Names) -> list[str]:
 def _space(names: Names, name: str, sets: list[str]) -> Part:
     axes = [names.states[axis] for axis in names.axes()]
     origin = frame.entity(name)
-    title = f"{_truth(names)}sets of {', '.join(axes)}"
+    title = f"Sets of {', '.join(axes)}" + (" with the truth (pink)" if names.truth_is_known else "")
     if len(axes) < 3:  # from the top
         height = 0.0 if len(axes) == 2 else 0.5 * frame.LANE * (len(names.estimators) + 1)
         position, target = (0.0, height, max(2.8, 2.5 * height)), (0.0, height, 0.0)

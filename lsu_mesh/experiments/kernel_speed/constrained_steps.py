@@ -49,9 +49,7 @@ def constrained_step(steps: int, rounds: int, seconds: float) -> ConstrainedStep
         candidates["zonoopt"] = Candidate(functools.partial(_all, other), steps)
     cost = compare(candidates, rounds, seconds)
     ratios = [_width(theirs()) / _width(ours()) for ours, theirs in zip(own, other, strict=False)]
-    return ConstrainedStep(
-        steps, cost["own"], cost.get("zonoopt"), float(np.mean(ratios)) if ratios else None
-    )
+    return ConstrainedStep(steps, cost["own"], cost.get("zonoopt"), float(np.mean(ratios)) if ratios else None)
 
 
 def generator_costs(counts: Sequence[int], rounds: int, seconds: float) -> list[GeneratorCost]:
@@ -69,9 +67,7 @@ def generator_costs(counts: Sequence[int], rounds: int, seconds: float) -> list[
     return costs
 
 
-def _steps(
-    generators: int, constraints: int, steps: int, *, beside_zonoopt: bool
-) -> tuple[list[Step], list[Step]]:
+def _steps(generators: int, constraints: int, steps: int, *, beside_zonoopt: bool) -> tuple[list[Step], list[Step]]:
     """Time update, data update and hull of ``steps`` steps of P3, by LSUCZ and by zonoopt."""
     model = get("P3")
     data = simulate(model, FIRST + steps + 1, seed=1)

@@ -69,9 +69,7 @@ def own_hull(c: Vector, G: Matrix, A: Matrix, b: Vector) -> Hull:
 def hull_cost(sets: int, rounds: int, seconds: float) -> HullCost:
     """Hulls of so many random sets of 20 generators, 8 constraints, dimension 3."""
     bodies = [random_set(seed) for seed in range(sets)]
-    makers = {"own": own_hull} | {
-        name: MAKERS[name] for name, package in SOLVERS.items() if installed(package)
-    }
+    makers = {"own": own_hull} | {name: MAKERS[name] for name, package in SOLVERS.items() if installed(package)}
     hulls = {name: [make(*body) for body in bodies] for name, make in makers.items()}
     difference = {name: _difference(hulls["own"], hulls[name]) for name in hulls if name != "own"}
     candidates = {name: Candidate(functools.partial(_all, of), sets) for name, of in hulls.items()}
@@ -87,9 +85,7 @@ def _difference(own: Sequence[Hull], other: Sequence[Hull]) -> float:
     largest = 0.0
     for ours, theirs in zip(own, other, strict=True):
         (lower, upper), (low, high) = ours(), theirs()
-        largest = max(
-            largest, float(np.max(np.maximum(abs(lower - low), abs(upper - high)) / (upper - lower)))
-        )
+        largest = max(largest, float(np.max(np.maximum(abs(lower - low), abs(upper - high)) / (upper - lower))))
     return largest
 
 
@@ -101,9 +97,7 @@ def safe_bounds(sets: int, rounds: int, seconds: float) -> SafeBounds:
         multipliers = np.array([_multipliers(A, b, d) for d in D])
         candidates = {
             "hull": Candidate(functools.partial(repeated_hulls(), A, b, D, REPEATED), REPEATED),
-            "bounds": Candidate(
-                functools.partial(repeated_bounds(), A, b, D, multipliers, REPEATED), REPEATED
-            ),
+            "bounds": Candidate(functools.partial(repeated_bounds(), A, b, D, multipliers, REPEATED), REPEATED),
         }
         times.append(compare(candidates, rounds, seconds))
     share = sum(one["bounds"] for one in times) / sum(one["hull"] for one in times)
@@ -177,10 +171,7 @@ def exact_vertex(A: Matrix, b: Vector, point: Vector) -> list[Fraction]:
     xi = [Fraction(float(x)) for x in point]
     rows = [
         [Fraction(float(row[j])) for j in basic]
-        + [
-            Fraction(float(side))
-            - sum(Fraction(float(a)) * x for a, x in zip(row, xi, strict=True) if abs(x) == 1)
-        ]
+        + [Fraction(float(side)) - sum(Fraction(float(a)) * x for a, x in zip(row, xi, strict=True) if abs(x) == 1)]
         for row, side in zip(A, b, strict=True)
     ]
     for k in range(m):

@@ -113,9 +113,7 @@ def _demands(
             _ratio(judged["LSUO"].numpy, judged["LSUO"].loop),
             100.0,
         ),
-        _at_least(
-            "LSUP on P3: plain NumPy ÷ compiled loop", _ratio(judged["LSUP"].numpy, judged["LSUP"].loop), 50.0
-        ),
+        _at_least("LSUP on P3: plain NumPy ÷ compiled loop", _ratio(judged["LSUP"].numpy, judged["LSUP"].loop), 50.0),
         _at_least("hull (20, 8), n = 3: linprog ÷ ours", _ratio(hull.seconds.get("linprog"), own), 100.0),
         _at_least("hull (20, 8), n = 3: warm highspy ÷ ours", _ratio(hull.seconds.get("highspy"), own), 10.0),
         _at_most("hull: difference from linprog and highspy, relative", max(exact) if exact else None, 1e-9),
