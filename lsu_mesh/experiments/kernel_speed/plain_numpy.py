@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.kernels.strip import TIE
 from lsu_mesh.model import LSUModel
 
 Vector = NDArray[np.float64]
@@ -64,7 +65,7 @@ def cut(c: Vector, T: Matrix, p: Vector, low: float, high: float) -> tuple[Vecto
     sign = np.where(g < 0, -1.0, 1.0)
     middle, half = 0.5 * sign * (left + right), 0.5 * (right - left)
     k = int(np.argmax(sizes * half))
-    if sizes[k] * 2.0 * half[k] <= h1 - l1:
+    if sizes[k] * 2.0 * half[k] <= (h1 - l1) * TIE:  # equal where one face cuts both
         return c + T @ middle, T * half
     direction = T[:, k] / g[k]
     edges = (T - np.outer(direction, g)) * half

@@ -52,11 +52,15 @@ class BankSpeed(NamedTuple):
 
 
 def stable_model(n: int) -> LSUModel:
-    """The system P3 for n = 3, else 0.9 × an orthogonal matrix, one input, two outputs, from a fixed seed."""
+    """The system P3 for n = 3, else an orthogonal matrix scaled to absolute row sums ≤ 0.9, from a fixed seed.
+
+    One input, two outputs. Boxes, too, stay bounded under such a matrix.
+    """
     if n == 3:
         return get("P3")
     random = np.random.default_rng(n)
-    A = 0.9 * np.linalg.qr(random.normal(size=(n, n)))[0]
+    A = np.linalg.qr(random.normal(size=(n, n)))[0]
+    A *= 0.9 / np.abs(A).sum(axis=1).max()
     return LSUModel(A, random.normal(size=(n, 1)), random.normal(size=(OUTPUTS, n)), rho=0.1, r=0.3)
 
 
