@@ -48,7 +48,7 @@ def test_endpoints_name_services_of_the_file(compose: dict[str, Any], configurat
             assert host is not None, endpoint
             assert host[1] in services, endpoint
         for endpoint in options.listen:
-            assert endpoint in (f"tcp/{name}:7447", "tcp/0.0.0.0:7447"), endpoint
+            assert endpoint == f"tcp/{name}:7447", endpoint
     assert configuration.network.entry == "tcp/router:7447"
 
 
@@ -59,6 +59,28 @@ def test_containers_run_as_a_numeric_user_without_privileges(compose: dict[str, 
     dockerfile = (root / "docker" / "Dockerfile").read_text()
     assert re.search(r"^USER \d+:\d+$", dockerfile, re.MULTILINE)
     assert "HEALTHCHECK" in dockerfile
+
+
+def test_the_kernels_are_compiled_from_the_installed_package_into_a_folder_that_stays_writable(root: Path) -> None:
+    """Numba keeps machine code by the path of its source, and uses only a folder that it may write to."""
+    folder, sources = "/", set()
+    dockerfile = (root / "docker" / "Dockerfile").read_text().replace("\\\n", " ")
+    for line in dockerfile.splitlines():
+        if line.startswith("WORKDIR "):
+            folder = line.split()[1]
+        if line.startswith("COPY lsu_mesh"):
+            sources.add(folder)
+        if "lsu_mesh.filters.warm_up" in line:
+            compiled_in, command = folder, line
+    assert sources
+    assert compiled_in not in sources
+    cache = re.search(r"NUMBA_CACHE_DIR=(\S+)", dockerfile)
+    assert cache is not None
+    assert re.search(rf"chown -R 10001:10001 .*{cache[1]}", command)
+
+
+def test_no_container_is_read_only_because_numba_then_compiles_at_every_start(compose: dict[str, Any]) -> None:
+    assert not any(service.get("read_only") for service in compose["services"].values())
 
 
 def test_the_router_is_published_on_the_loopback_only(compose: dict[str, Any]) -> None:
