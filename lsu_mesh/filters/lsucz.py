@@ -32,6 +32,10 @@ LITTLE_GAIN = 0.03
 """Nats below which a transferred set is weighed against what the reduction of the intersection costs."""
 
 
+LARGEST_EXACT_VOLUME = 3
+"""Dimension up to which :meth:`LSUCZ.volume` enumerates vertices; ``support.volume()`` does so up to 6."""
+
+
 class Held(NamedTuple):
     """What the filter knows: the state lies in the set with arrays ``body`` = (c, G, A, b) and in [lower, upper]."""
 
@@ -120,6 +124,13 @@ class LSUCZ(Filter):
             lower, upper = self.support.bounds()
             self._bounds = np.maximum(lower, self._held.lower), np.minimum(upper, self._held.upper)
         return self._bounds
+
+    def volume(self) -> float:
+        """Volume of :attr:`support` up to dimension 3, above it of :meth:`bounds`: cheap enough for each step."""
+        if self._model.state_count <= LARGEST_EXACT_VOLUME:
+            return self.support.volume()
+        lower, upper = self.bounds()
+        return float(np.prod(upper - lower))
 
     def predict_output(self) -> OutputPrediction:
         """``C X ⊕ [−r, r]`` by safe linear programs, met with interval arithmetic over :meth:`bounds`."""

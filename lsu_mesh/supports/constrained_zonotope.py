@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -161,10 +162,11 @@ class ConstrainedZonotope(Support):
         return is_proved_empty(self._A, self._b)
 
     def volume(self) -> float:
-        """Volume of the exact polytope up to dimension 6, above it of the interval hull; 0 when empty or flat."""
-        if self.dim > LARGEST_EXACT_VOLUME:
-            return 0.0 if self.is_empty() else float(np.prod(np.subtract(*self.bounds()[::-1])))
-        return self._polytope().volume
+        """Volume of the exact polytope up to dimension 6 (and 6 000 vertices), else of the interval hull above it."""
+        if self.is_empty():
+            return 0.0
+        exact = self._polytope().volume if self.dim <= LARGEST_EXACT_VOLUME else math.nan
+        return float(np.prod(np.subtract(*self.bounds()[::-1]))) if math.isnan(exact) else exact
 
     def vertices(self) -> Matrix:
         """Vertices (k, n) by refinement with support points; (0, n) for a set proved empty."""

@@ -67,7 +67,7 @@ class Intersection(Support):
         return self._bounds
 
     def volume(self) -> float:
-        """Volume of the exact polytope up to dimension 6, above it of the interval hull; 0 when empty or flat."""
+        """Volume of the joint polytope, see :meth:`ConstrainedZonotope.volume`."""
         return self._joint.volume()
 
     def contains(self, x: ArrayLike) -> bool:

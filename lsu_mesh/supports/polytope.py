@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -27,8 +30,12 @@ CONFIRMED = 1e-9
 """A facet is confirmed when no point lies farther than this, in units of the inscribed simplex."""
 
 
+MOST_VERTICES = 6_000
+"""Where more are found the enumeration stops: in dimension five and six a small set can have millions."""
+
+
 class Polytope(NamedTuple):
-    """Vertices (k, n) and the n-dimensional volume, 0 for a flat set."""
+    """Vertices (k, n) and the n-dimensional volume: 0 for a flat set, NaN where the enumeration was stopped."""
 
     vertices: Matrix
     volume: float
@@ -49,9 +56,11 @@ def enumerate_polytope(support_points: SupportPoints, n: int, surface: Surface |
         length = float(local[ends[1], 0] - local[ends[0], 0]) * float(np.linalg.norm(edges))
         return Polytope(points[ends], length if n == 1 else 0.0)
     if k == 3 and surface is not None:
-        seen = surface(inverse, inverse @ origin, local[simplex])
-        local = np.vstack([local, seen])
-        points = np.vstack([points, origin + seen @ edges.T])
+        local = surface(inverse, inverse @ origin, local[simplex])
+        points = origin + local @ edges.T
+    else:
+        distinct = _distinct(local, np.empty((0, k)))
+        points, local = points[distinct], local[distinct]
     points, indices, volume = _refine(support_points, points, local, inverse, origin)
     scale = abs(float(np.linalg.det(edges))) if k == n else 0.0
     return Polytope(points[indices], volume * scale)
@@ -102,27 +111,45 @@ def _complement(basis: list[Vector], n: int) -> Matrix:
 def _refine(
     support_points: SupportPoints, points: Matrix, local: Matrix, inverse: Matrix, origin: Vector
 ) -> tuple[Matrix, NDArray[np.int64], float]:
-    from scipy.spatial import ConvexHull
-
     asked: set[tuple[float, ...]] = set()
     while True:
-        hull = ConvexHull(local)
+        hull = _convex_hull(local)
         facets = {tuple(row) for row in np.round(hull.equations, 9).tolist()} - asked
         if not facets:
             break
+        if len(hull.vertices) > MOST_VERTICES:
+            return points, np.asarray(hull.vertices, dtype=np.int64), math.nan
         planes = np.array(sorted(facets))
         found = support_points(planes[:, :-1] @ inverse)
         found_local = (found - origin) @ inverse.T
         beyond = np.einsum("ij,ij->i", found_local, planes[:, :-1]) + planes[:, -1] > CONFIRMED
-        beyond[beyond] = _distance(found_local[beyond], local) > CONFIRMED
         # Every facet is asked once: where rounding alone puts its answer beyond it, asking again would never end.
         asked |= facets
-        if not beyond.any():
+        fresh = np.flatnonzero(beyond)[_distinct(found_local[beyond], local)]
+        if fresh.size == 0:
             break
-        points, local = np.vstack([points, found[beyond]]), np.vstack([local, found_local[beyond]])
+        points, local = np.vstack([points, found[fresh]]), np.vstack([local, found_local[fresh]])
     return points, np.asarray(hull.vertices, dtype=np.int64), float(hull.volume)
 
 
-def _distance(new: Matrix, known: Matrix) -> Vector:
-    """Distance of each new point to the nearest known one, in the largest coordinate."""
-    return np.array([np.abs(known - point).max(axis=1).min() for point in new])
+def _convex_hull(points: Matrix) -> ConvexHull:
+    """Qhull's hull, joggled only where merging nearly coplanar facets defeats it: for drawing and measuring."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return ConvexHull(points)
+    except QhullError:
+        return ConvexHull(points, qhull_options="QJ")
+
+
+def _distinct(new: Matrix, known: Matrix) -> NDArray[np.int64]:
+    """Indices of the new points that are farther than ``CONFIRMED`` from the known ones and from each other."""
+    from scipy.spatial import KDTree
+
+    if not len(new):
+        return np.zeros(0, dtype=np.int64)
+    repeated = {second for _, second in KDTree(new).query_pairs(CONFIRMED, p=np.inf)}
+    if len(known):
+        nearest, _ = KDTree(known).query(new, p=np.inf)
+        repeated.update(np.flatnonzero(nearest <= CONFIRMED).tolist())
+    return np.array([i for i in range(len(new)) if i not in repeated], dtype=np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import numpy as np
@@ -139,6 +140,19 @@ def test_volume_of_random_polytopes(n: int) -> None:
     directions = rng.normal(size=(3000, n))
     points = np.array([_farthest(z, d) for d in directions[: 300 * n]])
     assert z.volume() == pytest.approx(ConvexHull(points).volume, rel=1e-6)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5, 6])
+def test_volume_of_a_cut_box(n: int) -> None:
+    """``|Σ x_i| ≤ t`` cuts two corners of t = n − 1: simplices of volume 1/n! each."""
+    box = ConstrainedZonotope(np.zeros(n), np.eye(n), np.zeros((0, n)), [])
+    cut = box.meet_strips(np.ones((1, n)), [0.0], [n - 1.0])
+    assert cut.volume() == pytest.approx(2.0**n - 2 / math.factorial(n), rel=1e-8)
+
+
+def test_above_dimension_six_the_volume_is_that_of_the_hull() -> None:
+    box = ConstrainedZonotope(np.zeros(7), np.eye(7), np.zeros((0, 7)), [])
+    assert box.meet_strips(np.ones((1, 7)), [0.0], [6.0]).volume() == pytest.approx(2.0**7)
 
 
 def _farthest(z: ConstrainedZonotope, d: np.ndarray) -> np.ndarray:
