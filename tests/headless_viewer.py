@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes.util
-import json
 import os
 import signal
 import socket
@@ -18,6 +17,8 @@ from types import TracebackType
 from typing import Any
 
 from rerun.experimental import ViewerClient
+
+from services.recording.mend import quiet_environment
 
 VULKAN_DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
 PATIENCE_S = 60.0
@@ -45,18 +46,18 @@ class HeadlessViewer:
         self._started = 0.0
         self._heard: int | None = None
 
+    @property
+    def home(self) -> Path:
+        """Where this viewer keeps its settings and data."""
+        return Path(self._folder.name)
+
     def __enter__(self) -> HeadlessViewer:
-        home = Path(self._folder.name)
-        # Analytics stay off for this process without touching the settings of the user.
-        (home / "rerun").mkdir()
-        (home / "rerun" / "analytics.json").write_text(
-            json.dumps({"analytics_id": "none", "analytics_enabled": False, "salt": "none", "metadata": {}})
-        )
-        environment = os.environ | {
+        home = self.home
+        environment = quiet_environment() | {
             "VK_ICD_FILENAMES": str(_vulkan_driver()),
             "XDG_CONFIG_HOME": str(home),
+            "XDG_DATA_HOME": str(home),
             "XDG_RUNTIME_DIR": str(home),
-            "RERUN_FORCE_ANALYTICS": "0",
         }
         command = [_rerun(), "--headless", "--bind", "127.0.0.1", "--port", str(self._port), "--hide-welcome-screen"]
         with (home / "log").open("wb") as log:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 from services.cli import COULD_NOT_START, USAGE
+from services.recording.mend import quiet_environment
 
 MAGIC = (b"RRF2", b"RRF0", b"RRIO")
 
@@ -26,7 +26,7 @@ def main(options: argparse.Namespace) -> int:
         return USAGE
     viewer = Path(sys.executable).parent / "rerun"
     try:
-        return subprocess.call([str(viewer), str(path)], env={**os.environ, "DO_NOT_TRACK": "1"})
+        return subprocess.call([str(viewer), str(path)], env=quiet_environment())
     except FileNotFoundError:
         print(f"{viewer} is missing; install the extra: pip install 'lsu-mesh[mesh]'", file=sys.stderr)
         return COULD_NOT_START

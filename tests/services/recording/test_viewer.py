@@ -136,6 +136,11 @@ def test_a_viewer_that_follows_and_freezes_disturbs_nothing(viewer: HeadlessView
     assert sum("/truth/" in message.key for message in read_raw(recorder.path)) == 319
 
 
+def test_no_analytics_are_written_or_sent(viewer: HeadlessViewer) -> None:
+    assert viewer.home.is_dir()
+    assert not list(viewer.home.rglob("*analytics*"))
+
+
 def test_the_viewer_does_complain_of_a_broken_recording(viewer: HeadlessViewer, tmp_path: Path) -> None:
     """Guards the tests above: silence means something only where complaints are heard."""
     stream = rr.RecordingStream("broken")
