@@ -74,6 +74,33 @@ def test_exact_states_stay_inside_on_the_papers_systems(make: Maker, name: str) 
     assert run_exactly(make, case, seed=1, steps=25) == 25
 
 
+@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 6))
+def test_a_prediction_reaches_every_extreme_of_every_state(make: Maker, seed: int, n: int) -> None:
+    """The states that are extreme in coordinate i, with a centre that cancels: not an ulp of room is left to chance."""
+    rng = np.random.default_rng(seed)
+    center, widths = rng.normal(size=n) * 1e3, rng.random(n)
+    model = LSUModel(rng.normal(size=(n, n)), rng.normal(size=(n, 1)), np.zeros((0, n)), rng.random(n), 1.0)
+    prior = Orthotope(center - widths, center + widths)
+    assert model.B is not None
+    u = np.array([-(model.A[0] @ center) / model.B[0, 0]])
+    filter = make(model, prior)
+    filter.predict(u)
+    lower, upper = prior.bounds()
+    for i in range(n):
+        for sign in (-1, 1):
+            up = model.A[i] * sign > 0
+            x = [Fraction(v) for v in np.where(up, upper, lower).tolist()]
+            driven = exact_product(model.B, [Fraction(v) for v in u.tolist()])
+            extreme = [
+                a + b + sign * Fraction(w)
+                for a, b, w in zip(exact_product(model.A, x), driven, model.rho.tolist(), strict=True)
+            ]
+            assert inside_box(*filter.bounds(), extreme)
+            assert surely_holds(filter.support, extreme)
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
 def test_hundred_thousand_exact_steps(make: Maker) -> None:
