@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import secrets
 import sys
@@ -17,6 +16,7 @@ from services.bus import Arrival, Bus, Clock, SessionSettings
 from services.cli import COULD_NOT_START, OK
 from services.peer import Stop
 from services.recording.recorder import Recorder
+from services.recording.stream import next_part
 
 ROLE_NAME = "recorder"
 AFTER_STOP_S = 0.5
@@ -28,10 +28,12 @@ def run_recorder(configuration: Configuration, record: str | None, settings: Ses
     stop, clock = Stop(), Clock()
     template = record or configuration.recorder.path
     moment = time.strftime("%Y%m%d-%H%M%S")
-    path = _part(Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment)))
+    path = Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
+    was_restarted = os.environ.get("LSU_MESH_RESTARTS", "0") != "0"
+    part = next_part(path) if was_restarted else path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        recorder = Recorder(configuration, path)
+        recorder = Recorder(configuration, part, continues=path if part != path else None)
     except OSError as error:
         print(
             f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record",
@@ -50,14 +52,6 @@ def run_recorder(configuration: Configuration, record: str | None, settings: Ses
     finally:
         recorder.close()
     return OK
-
-
-def _part(path: Path) -> Path:
-    """The path itself, or for a recorder that was started again ``NAME.2.rrd``, ``NAME.3.rrd`` …"""
-    if os.environ.get("LSU_MESH_RESTARTS", "0") == "0":
-        return path
-    parts = (path.with_name(f"{path.stem}.{number}{path.suffix}") for number in itertools.count(2))
-    return next(part for part in parts if not part.exists())
 
 
 class RecorderService:
