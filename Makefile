@@ -36,6 +36,7 @@ soak: $(READY) ## the heavy checks at full size (hours)
 	$(BIN)/python -m pytest -q -m soak
 
 bench: $(READY) ## speed of filters and hulls beside other libraries, as ratios
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[bench,plots]"
 	@$(BIN)/lsu-mesh bench kernels
 
 example-adsb: $(READY) ## the altitude of a real aircraft through the mesh
