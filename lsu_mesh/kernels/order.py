@@ -45,7 +45,7 @@ def reduce_columns(L: Array, slack: Array, limit: int) -> Array:
         j = _least_harm(T, length, kept)
         kept[j] = False
         rest -= 1
-        _swallow(D, L, j, T, length, loose)
+        swallow_column(D, L, j, T, length, loose)
     columns = np.empty((N, N + rest))
     finite = True
     for k in range(N):
@@ -177,8 +177,8 @@ def _least_harm(T: Array, length: Array, kept: NDArray[np.bool_]) -> int:
     return chosen
 
 
-@inner
-def _swallow(D: Array, L: Array, j: int, T: Array, length: Array, slack: Array) -> None:
+@kernel
+def swallow_column(D: Array, L: Array, j: int, T: Array, length: Array, slack: Array) -> None:
     """Lengthen the basis by |t| and add what ``L_j − D t`` leaves, rounded up, to the slack."""
     N = D.shape[0]
     for i in range(N):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lsu_mesh.kernels.order import approximate_inverse, box_smallest, reduce_columns, swallow_box
+from lsu_mesh.kernels.order import approximate_inverse, box_smallest, reduce_columns, swallow_box, swallow_column
 from lsu_mesh.supports.exact_program import exact_solution
 
 
@@ -83,3 +83,13 @@ def test_no_proof_no_claim() -> None:
     assert not swallow_box(singular.copy(), approximate_inverse(singular), np.full(2, 1e-3))
     assert not swallow_box(np.eye(2), np.zeros((2, 2)), np.full(2, 1e-3))
     assert not swallow_box(np.eye(2), np.eye(2), np.full(2, 10.0))
+
+
+def test_wrong_coordinates_of_a_column_cost_slack_and_no_point() -> None:
+    D, L = np.array([[1.0, 0.5], [0.0, 2.0]]), np.array([[0.3], [-0.7]])
+    T = np.linalg.solve(D, L) + np.array([[1e-6], [-2e-6]])
+    length, slack = np.ones(2), np.zeros(2)
+    swallow_column(D, L, 0, T, length, slack)
+    assert (length >= 1 + np.abs(T[:, 0])).all()
+    assert (slack >= np.abs(L - D @ T)[:, 0]).all()
+    assert (slack <= np.abs(L - D @ T)[:, 0] + 1e-14).all()

@@ -111,6 +111,22 @@ def test_the_intersection_keeps_common_points_and_only_those(seed: int) -> None:
         assert not _holds(one[0], *arrays, beside)
 
 
+def test_a_rounded_difference_of_centres_is_charged() -> None:
+    """{0.1} is a corner of {1 + h ξ₁ + l ξ₂} with h + l = 1 − 0.1 exactly, while 1 − 0.1 is rounded up beyond that."""
+    exact = 1 - Fraction(0.1)
+    rounded = 1.0 - 0.1
+    assert Fraction(rounded) > exact
+    h = float(np.nextafter(rounded, 0.0))
+    rest = float(exact - Fraction(h))
+    assert Fraction(h) + Fraction(rest) == exact
+    point = np.array([0.1])
+    none = np.zeros((0, 2))
+    arrays = meet_sets(
+        point, np.zeros((1, 0)), np.zeros((0, 0)), np.zeros(0), np.ones(1), np.array([[h, rest]]), none, np.zeros(0)
+    )
+    assert _holds(point, *arrays, [Fraction(0.1)])
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_maps_sums_and_projections_are_rounded_outward(seed: int) -> None:
