@@ -139,6 +139,10 @@ class Estimator(Node):
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
         """The message about the set after the data."""
 
+    def published_bounds(self) -> tuple[Vector, Vector]:
+        """Bounds of the set after the data, as they are published."""
+        return self.engine.bounds()
+
     def prediction(self, k: int, now: int) -> list[Message]:
         """Messages about the set before the data of step k."""
         return []
@@ -295,7 +299,8 @@ class Estimator(Node):
     def _publish(self, k: int, step: Step, combined: Combined, now: int) -> Posterior | None:
         """The posterior's message, or None when the step was published before with the same set."""
         support, old = to_message(self.engine.support), step.published
-        if old is not None and (old.support, old.status) == (support, combined.status):
+        box = tuple(bound.tolist() for bound in self.published_bounds())
+        if old is not None and (old.support, (old.lower, old.upper), old.status) == (support, box, combined.status):
             self._base, self._used = old.reference, ()
             return None
         step.revision += 1

@@ -294,6 +294,9 @@ class FusionNode(Estimator):
 
     # -- messages out
 
+    def published_bounds(self) -> tuple[Vector, Vector]:
+        return self._met
+
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
         lower, upper = self._met
         return Fused(
