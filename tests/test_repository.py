@@ -48,7 +48,8 @@ def test_every_make_command_that_the_readme_names_exists(root: Path) -> None:
 
 
 def test_every_link_of_the_pages_leads_somewhere(root: Path) -> None:
-    for page in [root / "README.md", root / "CHANGELOG.md", *sorted((root / "docs").rglob("*.md"))]:
+    pages = [*(root / "docs").rglob("*.md"), *(root / "examples").rglob("*.md")]
+    for page in [root / "README.md", root / "CHANGELOG.md", *sorted(pages)]:
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
             if not target.startswith("http"):
                 assert (page.parent / target).exists(), f"{page.name}: {target}"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from convert import FLIGHTS, load, new_reports
@@ -84,7 +85,15 @@ def main(arguments: Sequence[str]) -> int:
         print(f"  {name}, every age 0: explained from |a| <= {smallest(data, offset=0.0, acceleration=None):.1f} ft/s²")
     least = smallest(reports, offset=None, acceleration=MOST_ACCELERATION)
     print(f"  new reports, |a| <= {MOST_ACCELERATION:g} ft/s²: explained from an age offset of ±{least:.1f} ft")
+    print(f"  vertical rates change by up to {largest_change(vectors):.0f} ft/min from one second to the next")
     return 0
+
+
+def largest_change(vectors: Sequence[dict[str, Any]]) -> float:
+    """The largest change of the broadcast vertical rate between consecutive seconds, in ft/min."""
+    rates = {round(vector["timestamp"] / 1000): vector["vertical_rate"] for vector in vectors}
+    known = {time: rate for time, rate in rates.items() if rate is not None}
+    return float(max(abs(rate - known[time - 1]) for time, rate in known.items() if time - 1 in known))
 
 
 if __name__ == "__main__":
