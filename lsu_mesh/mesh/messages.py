@@ -227,7 +227,7 @@ class Posterior(Message, frozen=True, kw_only=True):
     missing: Annotated[list[Text], Meta(max_length=4096)]
     cause: Text | None = None
     gain: float | None = None
-    """Gain of the step's Bayesian transfers in nats; nil where none was used."""
+    """Gain of the step's Bayesian transfers in nats; nil where none was used, or where the set became flat."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)

@@ -69,6 +69,27 @@ def test_predictors_are_taken_only_from_those_named(mesh_of: MakeMesh) -> None:
     assert sources == {"filter/cz"}
 
 
+def test_a_transfer_that_leaves_a_point_has_no_finite_gain_and_kills_nobody(mesh_of: MakeMesh) -> None:
+    from lsu_mesh.mesh.keys import key
+    from lsu_mesh.mesh.messages import OrthotopeMessage, encode
+
+    mesh = mesh_of(f"mesh.steps={STEPS}", *transfers("predictor", "box"))
+    mesh.kill("cz")
+    mesh.run(0.37)
+    own = next(m for m in mesh.of(Prediction, "box") if m.step == 20)
+    middle = (0.5 * (np.array(own.lower) + own.upper)).tolist()
+    point = Prediction(
+        v=1, src="filter/cz", boot="f" * 16, seq=0, step=20, sent_ns=1, origin_ns=1, model=mesh.configuration.digest(),
+        support=OrthotopeMessage(lower=middle, upper=middle), lower=middle, upper=middle,
+        y_lower=[0.0], y_upper=[1.0], y_point=[0.5], epoch=0, guarantee="declared",
+    )  # fmt: skip
+    mesh.hand_over(key("demo", "prediction", "cz"), encode(point))
+    mesh.run(STEPS * 0.02)
+    assert ("prediction", "filter/cz", "f" * 16, 0) in mesh.newest("box")[20].used
+    assert mesh.newest("box")[20].gain is None
+    assert max(mesh.newest("box")) == STEPS
+
+
 def test_the_data_predictor_is_marked_as_not_guaranteed(mesh_of: MakeMesh) -> None:
     sharp = ("sensors.s4={C=[[1.0, 0.0, 0.5]], r=[0.05]}", 'filters.sharp={kind="LSUCZ", sensors=["s2", "s3", "s4"]}')
     changes = [*sharp, *transfers("data-predictor", "box"), "sensors.s1.r=[1.0]", 'filters.box.transfer_from=["sharp"]']

@@ -424,5 +424,5 @@ class Estimator(Node):
 
 
 def finite_or_none(value: float) -> float | None:
-    """A logarithm of a volume for a message: None for flat sets."""
+    """A logarithm of volumes for a message: None where a set is flat, or became flat."""
     return value if math.isfinite(value) else None

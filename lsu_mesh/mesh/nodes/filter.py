@@ -289,7 +289,7 @@ class FilterNode(Estimator):
             bounds=self._bounds_in_force(),
             missing=list(combined.missing),
             cause=combined.cause,
-            gain=combined.gain,
+            gain=None if combined.gain is None else finite_or_none(combined.gain),
         )
 
     def _bounds_in_force(self) -> Bounds:
