@@ -103,11 +103,13 @@ def same_states(model: LSUModel, step_model: LSUModel | None) -> LSUModel:
     return step_model
 
 
-def checked_prior(model: LSUModel, prior: Support) -> Support:
-    """The prior, a set in the space of the states.
+def checked_prior(model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike]) -> Support:
+    """The prior, a set in the space of the states; a pair stands for the box (lower, upper).
 
     Raises ``ModelError`` where it is no set or has another dimension.
     """
+    if isinstance(prior, tuple) and len(prior) == 2:
+        prior = Orthotope(*prior)
     if not isinstance(prior, Support):
         raise ModelError(f"the prior must be a support such as Orthotope(lower, upper), not {type(prior).__name__}")
     if prior.dim != model.state_count:

@@ -40,7 +40,7 @@ class CompiledFilter(Filter):
     family: ClassVar[int]
     option: int
 
-    def __init__(self, model: LSUModel, prior: Support, option: int) -> None:
+    def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], option: int) -> None:
         self.option = option
         self._model = model
         self._arrays = kernel_model(model)

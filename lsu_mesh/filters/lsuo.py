@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
@@ -28,7 +28,7 @@ class LSUO(CompiledFilter):
     model:
         The system; n states, m outputs.
     prior:
-        A set that holds x_1; its interval hull is used.
+        A set, or a pair (lower, upper), that holds x_1; its interval hull is used.
     meet:
         Meet the hull of the strip result with the prediction (the hull alone can exceed it); ``False`` reproduces
         the paper.
@@ -44,7 +44,11 @@ class LSUO(CompiledFilter):
     family: ClassVar[int] = step.BOX
 
     def __init__(
-        self, model: LSUModel, prior: Support, meet: bool = True, hull: Literal["strips", "lp"] = "strips"
+        self,
+        model: LSUModel,
+        prior: Support | tuple[ArrayLike, ArrayLike],
+        meet: bool = True,
+        hull: Literal["strips", "lp"] = "strips",
     ) -> None:
         if hull not in ("strips", "lp"):
             raise ModelError(f'hull must be "strips" or "lp", not {hull!r}')

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
@@ -40,20 +40,28 @@ class LSUP(CompiledFilter):
     model:
         The system; n states, m outputs.
     prior:
-        A set that holds x_1: a parallelotope or a box is used as it is, of other sets the interval hull.
+        A set, or a pair (lower, upper), that holds x_1: a parallelotope or a box is used as it is, of other sets the
+        interval hull.
     time_update:
         ``"image"``: edges along A T, which reproduces the papers; ``"cgz"``: noise generators take the place of edges,
         one at a time, where that leaves less volume; ``"edges"``: the best n of all edges, n ≤ 6; ``"strips"``: the
         image, then the faces of the circumscribed box as strips.
 
     Raises ``ModelError`` on options or a prior that do not fit.
+
+    A strip never makes the volume larger, but it may make the interval hull larger: the new edges can leave the old
+    set. Where the hull matters, use LSUPB. A flat set stays as thin as rounding allows, not thinner: its volume is
+    tiny, not 0.
+
     Source: Lainová et al. 2019, section 3.2; Vicino & Zappa 1996; Chisci, Garulli & Zappa 1996.
     """
 
     kind: ClassVar[str] = "LSUP"
     family: ClassVar[int] = step.PARALLELOTOPE
 
-    def __init__(self, model: LSUModel, prior: Support, time_update: TimeUpdate = "image") -> None:
+    def __init__(
+        self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], time_update: TimeUpdate = "image"
+    ) -> None:
         if time_update not in TIME_UPDATES:
             raise ModelError(f"time_update must be one of {', '.join(TIME_UPDATES)}, not {time_update!r}")
         n, q = model.state_count, model.rho.size

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.kernels import step
@@ -30,8 +30,8 @@ class LSUPB(CompiledFilter):
     model:
         The system; n states, m outputs.
     prior:
-        A set that holds x_1. A parallelotope (or an intersection with one as a part) is used as it is, with its
-        interval hull as the box; of other sets the interval hull.
+        A set, or a pair (lower, upper), that holds x_1. A parallelotope (or an intersection with one as a part) is
+        used as it is, with its interval hull as the box; of other sets the interval hull.
 
     It cures the two faults of a parallelotope alone, elongation over time and a hull wider than the data allow. The
     parallelotope is that of Lainová et al. 2019, section 3.2; the bundle is this library's own.
@@ -40,7 +40,7 @@ class LSUPB(CompiledFilter):
     kind: ClassVar[str] = "LSUPB"
     family: ClassVar[int] = step.BUNDLE
 
-    def __init__(self, model: LSUModel, prior: Support) -> None:
+    def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike]) -> None:
         super().__init__(model, prior, option=0)
 
     @staticmethod

@@ -130,7 +130,9 @@ def test_arguments_that_do_not_fit_are_named(make: Make) -> None:
             call()
     np.testing.assert_array_equal(filter.bounds(), before)
     with pytest.raises(ModelError, match="support such as Orthotope"):
-        type(filter)(P3, ([0.0], [1.0]))  # type: ignore[call-arg, arg-type]
+        type(filter)(P3, [0.0, 1.0])  # type: ignore[call-arg, arg-type]
+    paired = type(filter)(P3, ([-1.0] * 3, [1.0] * 3))  # type: ignore[call-arg, arg-type]
+    np.testing.assert_array_equal(paired.bounds(), filter.bounds())
 
 
 @every_kind
