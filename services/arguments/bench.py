@@ -1,0 +1,15 @@
+"""Arguments of ``lsu-mesh bench``."""
+
+from __future__ import annotations
+
+from services.arguments.parsing import Commands, new_command
+
+
+def add(commands: Commands) -> None:
+    """The command ``bench``."""
+    parser = new_command(commands, "bench", "measure speed beside other libraries, as ratios in one run on one core")
+    parser.add_argument("what", choices=("kernels",), help="kernels: steps of filters, hulls, banks, a new process")
+    parser.add_argument("--quick", action="store_true", help="few sizes and rounds: shows that it works, not how fast")
+    parser.add_argument("--out", metavar="DIR", help="folder for the figure and the JSON file (needs matplotlib)")
+    parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of tables")
+    parser.set_defaults(handler="services.commands.bench")
