@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh import systems
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
+from lsu_mesh.experiments.workers import Watch, spread, unwatched
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
@@ -63,12 +65,18 @@ class Tally:
     """Errors (n,) of the points: of the local filter with the smallest hull, of the fusion, of the central filter."""
 
 
-def run(quick: bool = False, seed: int = 1) -> Outcome:
+def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome:
     """The comparison for four kinds of filters and three kinds of feedback."""
     seeds = range(seed, seed + (2 if quick else 10))
     steps = 40 if quick else 100
-    tallies = {(kind, way): tally(kind, way, seeds, steps) for kind in KINDS for way in FEEDBACKS}
+    ways = [(kind, way) for kind in KINDS for way in FEEDBACKS]
+    counts = spread(partial(_tally_of, seeds=seeds, steps=steps), ways, watch)
+    tallies = dict(zip(ways, counts, strict=True))
     return Outcome([_table(tallies, len(seeds), steps)], _checks(tallies), {})
+
+
+def _tally_of(way: tuple[str, str], seeds: range, steps: int) -> Tally:
+    return tally(*way, seeds, steps)
 
 
 def tally(kind: str, feedback: str, seeds: range, steps: int) -> Tally:

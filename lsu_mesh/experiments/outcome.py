@@ -6,12 +6,39 @@ import csv
 import io
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Cell = str | int | float
+NOTHING = "–"
+"""A cell of a column of numbers that holds none."""
+SPREAD = " (mean ± sd)"
+"""End of the title of a column with spreads."""
+
+
+class Spread(NamedTuple):
+    """A number measured in several runs: mean and standard deviation over the runs."""
+
+    mean: float
+    sd: float
+
+    @classmethod
+    def of(cls, values: ArrayLike) -> Spread:
+        """Mean and standard deviation (n − 1) of one number per run; 0 for a single run."""
+        runs = np.asarray(values, dtype=np.float64).ravel()
+        return cls(float(runs.mean()), float(runs.std(ddof=1)) if runs.size > 1 else 0.0)
+
+    def printed(self, form: str) -> str:
+        """``mean ± sd``, the standard deviation with two digits."""
+        return f"{_text(self.mean, form)} ± {_text(self.sd, '.2g')}"
+
+
+Cell = str | int | float | Spread
 
 
 class Column(NamedTuple):
@@ -37,7 +64,7 @@ class Table(NamedTuple):
 
     def is_numeric(self, column: int) -> bool:
         """Whether a column holds numbers, which are aligned to the right."""
-        return all(not isinstance(row[column], str) for row in self.rows)
+        return all(not isinstance(row[column], str) or row[column] == NOTHING for row in self.rows)
 
     def markdown(self) -> str:
         """The table for a document, with its title above."""
@@ -58,17 +85,35 @@ class Table(NamedTuple):
         return "\n".join([self.title, *(line.rstrip() for line in lines)])
 
     def csv(self) -> str:
-        """The unrounded numbers, with a line of titles."""
+        """The unrounded numbers, with a line of titles; mean and standard deviation have a column each."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([column.title for column in self.columns])
-        writer.writerows(self.rows)
+        writer.writerow(self._split_titles())
+        writer.writerows(map(self._split, self.rows))
         return text.getvalue()
 
-    def records(self) -> list[dict[str, Cell | None]]:
-        """One mapping per row, for JSON: numbers that are not finite become None."""
-        titles = [column.title for column in self.columns]
-        return [dict(zip(titles, map(_finite, row), strict=True)) for row in self.rows]
+    def records(self) -> list[dict[str, str | int | float | None]]:
+        """One mapping per row, for JSON, with the columns of :meth:`csv`; numbers that are not finite become None."""
+        titles = self._split_titles()
+        return [dict(zip(titles, map(_finite, self._split(row)), strict=True)) for row in self.rows]
+
+    def _is_split(self, column: int) -> bool:
+        return any(isinstance(row[column], Spread) for row in self.rows)
+
+    def _split_titles(self) -> list[str]:
+        titles = []
+        for i, column in enumerate(self.columns):
+            titles += [column.title.removesuffix(SPREAD), "sd"] if self._is_split(i) else [column.title]
+        return titles
+
+    def _split(self, row: tuple[Cell, ...]) -> list[str | int | float]:
+        cells: list[str | int | float] = []
+        for i, cell in enumerate(row):
+            if isinstance(cell, Spread):
+                cells += cell
+            else:
+                cells += [cell, ""] if self._is_split(i) else [cell]
+        return cells
 
 
 class Check(NamedTuple):
@@ -90,11 +135,20 @@ class Check(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Tables, checks, and figures by the stem of their file; a figure is drawn when its function is called."""
+    """Tables, checks, and figures by the stem of their file; a figure is drawn when its function is called.
+
+    What holds measured times, and so differs from run to run, has ``times`` in its name. The rest is words for the page
+    (Markdown): ``title`` of the section, ``notes`` above the tables, ``captions`` of figures by stem, ``errata`` of the
+    paper.
+    """
 
     tables: Sequence[Table]
     checks: Sequence[Check]
     figures: Mapping[str, Callable[[], Figure]]
+    title: str = ""
+    notes: str = ""
+    captions: Mapping[str, str] = MappingProxyType({})
+    errata: Sequence[str] = ()
 
 
 def percent(share: float) -> float:
@@ -105,10 +159,12 @@ def percent(share: float) -> float:
 def _text(cell: Cell, form: str) -> str:
     if isinstance(cell, str):
         return cell
+    if isinstance(cell, Spread):
+        return cell.printed(form)
     if isinstance(cell, float) and not math.isfinite(cell):
-        return "–" if math.isnan(cell) else "∞"
+        return NOTHING if math.isnan(cell) else "∞"
     return f"{cell:{form}}" if isinstance(cell, float) else str(cell)
 
 
-def _finite(cell: Cell) -> Cell | None:
+def _finite(cell: str | int | float) -> str | int | float | None:
     return None if isinstance(cell, float) and not math.isfinite(cell) else cell

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from lsu_mesh import systems
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.experiments.fusion import Make
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
+from lsu_mesh.experiments.workers import Watch, spread, unwatched
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
@@ -95,16 +97,17 @@ class Result(NamedTuple):
     restarts: float
 
 
-def run(quick: bool = False, seed: int = 1) -> Outcome:
+def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome:
     """The curves over r_S ∈ [.01 r, 10 r] for all systems, kinds of filters and ways."""
     seeds, steps = range(seed, seed + (2 if quick else 5)), 60 if quick else 100
-    results = [
-        result(system, kind, way, float(ratio), seeds, steps)
+    points = [
+        (system, kind, way, float(ratio))
         for system, kinds in SYSTEMS.items()
         for kind in kinds
         for way in WAYS
         for ratio in (SHOWN_RATIOS if quick else RATIOS)
     ]
+    results = spread(partial(_result_at, seeds=seeds, steps=steps), points, watch)
 
     def draw() -> Figure:
         from lsu_mesh.experiments.transfer_figure import draw_transfer
@@ -116,6 +119,10 @@ def run(quick: bool = False, seed: int = 1) -> Outcome:
         shown = [point for point in results if point.ratio in SHOWN_RATIOS]
         tables = [_table("transfer", shown, len(seeds), steps), _table("transfer-curves", results, len(seeds), steps)]
     return Outcome(tables, _checks(results), {"transfer": draw})
+
+
+def _result_at(point: tuple[str, str, str, float], seeds: range, steps: int) -> Result:
+    return result(*point, seeds, steps)
 
 
 def result(system: str, kind: str, way: str, ratio: float, seeds: Iterable[int], steps: int) -> Result:

@@ -7,36 +7,118 @@ import importlib
 import json
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
+from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.experiments.outcome import Outcome, Table
+from lsu_mesh.experiments.page import page
+from lsu_mesh.experiments.workers import Watch, part
+from services.arguments.reproduce import ALL, REPRODUCIBLE, WITH_BENCHMARKS
 from services.cli import COULD_NOT_START, NOT_MET, OK, USAGE
+from services.progress import ShareDone
 
-MODULES = {"fusion": ("fusion", "transfer")}
-"""The experiments that stand behind each choice; ``services.cli.REPRODUCIBLE`` says what they are."""
+PAGE = "papers"
+"""Stem of the page of ``all``, and the folder of its files."""
+DOTS_PER_INCH = 90
 
 
 def main(options: argparse.Namespace) -> int:
+    refusal = _refusal(options)
+    if refusal:
+        print(refusal, file=sys.stderr)
+        return USAGE
     folder = None if options.out is None else Path(options.out)
-    if folder is not None:
+    if folder is not None and not _has_matplotlib():
+        print("figures need matplotlib: pip install 'lsu-mesh[plots]'", file=sys.stderr)
+        return COULD_NOT_START
+    files = folder if folder is None or options.what != ALL else folder / PAGE
+    try:
+        if files is not None:
+            files.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        print(f"{files}: cannot be made: {error.strerror}", file=sys.stderr)
+        return USAGE
+    outcomes = {}
+    for what in _chosen(options):
         try:
-            import matplotlib  # noqa: F401
-        except ImportError:
-            print("figures need matplotlib: pip install 'lsu-mesh[plots]'", file=sys.stderr)
+            outcomes[what] = _run(what, options)
+        except LsuMeshError as error:
+            print(f"{what}: {error}", file=sys.stderr)
             return COULD_NOT_START
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            print(f"{folder}: cannot be made: {error.strerror}", file=sys.stderr)
-            return USAGE
-    are_met = True
-    for name in MODULES[options.what]:
-        outcome: Outcome = importlib.import_module(f"lsu_mesh.experiments.{name}").run(options.quick, options.seed)
-        _print_json(outcome) if options.json else _print_tables(outcome)
-        for path in () if folder is None else _write(outcome, folder):
-            print(f"wrote {path}", file=sys.stderr)
-        are_met = are_met and all(check.is_met for check in outcome.checks)
+        for outcome in outcomes[what]:
+            _print_json(outcome) if options.json else _print_tables(outcome)
+            for path in () if files is None else _write(outcome, files):
+                print(f"wrote {path}", file=sys.stderr)
+    if folder is not None and options.what == ALL:
+        _write_page({what: _joined(parts) for what, parts in outcomes.items()}, folder, options)
+    are_met = all(check.is_met for parts in outcomes.values() for outcome in parts for check in outcome.checks)
     return OK if are_met else NOT_MET
+
+
+def _refusal(options: argparse.Namespace) -> str:
+    """Why these options do not fit together, or nothing."""
+    if options.what == WITH_BENCHMARKS and options.benchmarks is None:
+        return f"{WITH_BENCHMARKS}: the published systems are not shipped; give their folder by --benchmarks DIR"
+    if options.benchmarks is not None and options.what not in (WITH_BENCHMARKS, ALL):
+        return f"--benchmarks: only {WITH_BENCHMARKS} and {ALL} read published systems, {options.what} does not"
+    if options.benchmarks is not None and not Path(options.benchmarks).is_dir():
+        return f"--benchmarks {options.benchmarks}: there is no such folder"
+    return ""
+
+
+def _has_matplotlib() -> bool:
+    with suppress(ImportError):
+        import matplotlib  # noqa: F401
+
+        return True
+    return False
+
+
+def _chosen(options: argparse.Namespace) -> Iterator[str]:
+    for what in REPRODUCIBLE:
+        if options.what not in (what, ALL):
+            continue
+        if what == WITH_BENCHMARKS and options.benchmarks is None:
+            print(f"{what} is left out: give the folder of the published systems by --benchmarks DIR", file=sys.stderr)
+            continue
+        yield what
+
+
+def _run(what: str, options: argparse.Namespace) -> list[Outcome]:
+    """The outcomes of the experiments behind one choice, with a bar on a terminal."""
+    modules = REPRODUCIBLE[what].modules
+    further = {"folder": Path(options.benchmarks)} if what == WITH_BENCHMARKS else {}
+    outcomes = []
+    with ShareDone(what) as bar:
+        for i, name in enumerate(modules):
+            watch: Watch = part(bar.show, i / len(modules), (i + 1) / len(modules))
+            run = importlib.import_module(f"lsu_mesh.experiments.{name}").run
+            outcomes.append(run(options.quick, options.seed, watch, **further))
+    return outcomes
+
+
+def _joined(outcomes: list[Outcome]) -> Outcome:
+    """The experiments of one choice as one section of the page."""
+    return Outcome(
+        [table for outcome in outcomes for table in outcome.tables],
+        [check for outcome in outcomes for check in outcome.checks],
+        {stem: draw for outcome in outcomes for stem, draw in outcome.figures.items()},
+        title=next((outcome.title for outcome in outcomes if outcome.title), ""),
+        notes="\n\n".join(outcome.notes for outcome in outcomes if outcome.notes),
+        captions={stem: caption for outcome in outcomes for stem, caption in outcome.captions.items()},
+        errata=[line for outcome in outcomes for line in outcome.errata],
+    )
+
+
+def _write_page(outcomes: dict[str, Outcome], folder: Path, options: argparse.Namespace) -> None:
+    quick = " --quick" if options.quick else ""
+    seed = f" --seed {options.seed}" if options.seed != 1 else ""
+    benchmarks = " --benchmarks DIR" if options.benchmarks is not None else ""
+    path = folder / f"{PAGE}.md"
+    text = page(outcomes, f"lsu-mesh reproduce {ALL}{quick}{seed}{benchmarks} --out {folder.name}", PAGE)
+    path.write_text(text, encoding="utf-8")
+    print(f"wrote {path}", file=sys.stderr)
 
 
 def _print_tables(outcome: Outcome) -> None:
@@ -85,5 +167,5 @@ def _write(outcome: Outcome, folder: Path) -> Iterator[Path]:
             yield path
     for name, draw in outcome.figures.items():
         path = folder / f"{name}.png"
-        draw().savefig(path, dpi=90)
+        draw().savefig(path, dpi=DOTS_PER_INCH)
         yield path

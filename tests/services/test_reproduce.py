@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 from lsu_mesh.experiments import fusion, transfer
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table
 from services import cli
+from services.arguments.reproduce import REPRODUCIBLE
 from services.commands import reproduce
 
 
@@ -31,12 +33,14 @@ def made(limit: float) -> Outcome:
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Experiments that take no time: the first meets its check."""
-    monkeypatch.setattr(fusion, "run", lambda quick, seed: made(2.0))
-    monkeypatch.setattr(transfer, "run", lambda quick, seed: made(2.0 if quick else 1.0))
+    monkeypatch.setattr(fusion, "run", lambda quick, seed, watch: made(2.0))
+    monkeypatch.setattr(transfer, "run", lambda quick, seed, watch: made(2.0 if quick else 1.0))
 
 
 def test_every_choice_has_its_experiments() -> None:
-    assert set(reproduce.MODULES) == set(cli.REPRODUCIBLE)
+    for experiment in REPRODUCIBLE.values():
+        for name in experiment.modules:
+            assert callable(importlib.import_module(f"lsu_mesh.experiments.{name}").run)
 
 
 @pytest.mark.usefixtures("small")
@@ -75,3 +79,39 @@ def test_a_folder_that_cannot_be_made_is_said(tmp_path: Path, capsys: pytest.Cap
     (tmp_path / "file").write_text("")
     assert cli.main(["reproduce", "fusion", "--out", str(tmp_path / "file")]) == cli.USAGE
     assert "cannot be made" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("small")
+def test_all_writes_a_page_beside_the_folder_of_its_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reproduce, "REPRODUCIBLE", {"fusion": REPRODUCIBLE["fusion"]})
+    assert cli.main(["reproduce", "all", "--quick", "--out", str(tmp_path)]) == cli.OK
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["papers", "papers.md"]
+    text = (tmp_path / "papers.md").read_text(encoding="utf-8")
+    assert f"`lsu-mesh reproduce all --quick --out {tmp_path.name}`" in text
+    assert "![f](papers/f.png)" in text
+    assert f"wrote {tmp_path / 'papers.md'}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["fusion", "--benchmarks", "x"], "--benchmarks: only cora and all read published systems, fusion does not"),
+        (["all", "--benchmarks", "no-such-folder"], "--benchmarks no-such-folder: there is no such folder"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["reproduce", *arguments]) == cli.USAGE
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"), [(["fusion", "--seed", "-1"], "0 or more"), (["p1999"], "invalid choice: 'p1999'")]
+)
+def test_wrong_arguments_are_refused(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["reproduce", *arguments])
+    assert said in capsys.readouterr().err
