@@ -18,6 +18,8 @@ from typing import Any, NamedTuple, Self
 import zenoh
 from zenoh import ext
 
+from services.security import Certificates
+
 LEASE_MS = 2000
 HEARTBEAT_S = 0.1
 QUEUE_LIMIT = 65536
@@ -42,6 +44,7 @@ class SessionSettings:
     cache: int = 256
     multicast: bool = False
     zenoh: Sequence[str] = ()
+    certificates: Certificates | None = None
 
 
 class NoSession(Exception):
@@ -207,6 +210,7 @@ def _zenoh_configuration(settings: SessionSettings) -> Any:
         "timestamping/enabled": True,
         "adminspace/enabled": True,
     }
+    values |= {} if settings.certificates is None else _security(settings.certificates)
     configuration = zenoh.Config()
     for path, value in values.items():
         configuration.insert_json5(path, json.dumps(value))
@@ -214,6 +218,22 @@ def _zenoh_configuration(settings: SessionSettings) -> Any:
         path, _, text = item.partition(":" if ":" in item.partition("=")[0] else "=")
         configuration.insert_json5(path, text)
     return configuration
+
+
+def _security(files: Certificates) -> dict[str, object]:
+    """Encrypted links only; both ends show a certificate, and the rules say what its name may do."""
+    tls = {
+        "root_ca_certificate": str(files.authority),
+        "listen_certificate": str(files.certificate),
+        "listen_private_key": str(files.key),
+        "connect_certificate": str(files.certificate),
+        "connect_private_key": str(files.key),
+        "enable_mtls": True,
+        "verify_name_on_connect": files.verify_hosts,
+        "close_link_on_expiration": True,
+    }
+    values: dict[str, object] = {"transport/link/tls": tls, "transport/link/protocols": ["tls", "quic"]}
+    return values if files.access_control is None else {**values, "access_control": files.access_control}
 
 
 def _explained(settings: SessionSettings, error: str) -> str:

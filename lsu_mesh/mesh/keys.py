@@ -10,6 +10,14 @@ TOPICS = ("truth", "input", "measurement", "prediction", "posterior", "fused", "
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 NAME_RULE = "1 to 64 ASCII letters, digits, '_', '-' or '.', the first a letter or a digit"
 
+READER = "viewer"
+"""Name in the certificate of those who read everything and publish nothing: subscribers, tools, ``lsu-mesh run``."""
+ROUTER = "router"
+"""Name in the certificate of a router, which passes on what others send and is trusted to check whose it is."""
+AUTHORITY = "ca"
+RESERVED = (READER, ROUTER, AUTHORITY)
+"""Names that no peer may have where certificates carry names."""
+
 
 class Address(NamedTuple):
     """What a key says: the mesh, the topic and the name of its one publisher."""

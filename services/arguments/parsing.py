@@ -40,7 +40,16 @@ def add_network(parser: argparse.ArgumentParser) -> None:
         "-l", "--listen", metavar="ENDPOINT", action="append", default=[],
         help="endpoint to listen on (default: network.listen, else a free port of the loopback interface)",
     )  # fmt: skip
+    add_insecure(group)
     group.add_argument("--cfg", metavar="PATH:VALUE", action="append", default=[], help="any setting of Zenoh")
     scouting = group.add_mutually_exclusive_group()
     scouting.add_argument("--multicast-scouting", action="store_true", help="find peers by multicast too")
     scouting.add_argument("--no-multicast-scouting", action="store_true", help="the default, for scripts that say so")
+
+
+def add_insecure(group: argparse._ActionsContainer) -> None:
+    """``--insecure``: listening for other hosts without TLS is meant."""
+    group.add_argument(
+        "--insecure", action="store_true",
+        help="listen for other hosts without TLS too, because the network itself is closed",
+    )  # fmt: skip

@@ -54,5 +54,9 @@ def _add_peer(commands: Commands, role: str, words: str) -> None:
 def _add_router(commands: Commands) -> None:
     parser = new_command(commands, "router", "route between peers of different networks")
     parser.add_argument("name", metavar="NAME", nargs="?", default="router", help="only shown (default: router)")
+    parser.add_argument(
+        "-c", "--config", metavar="mesh.toml", help="configuration with the certificates and rules of its mesh"
+    )
+    add_overrides(parser)
     add_network(parser)
     parser.set_defaults(handler="services.commands.router")

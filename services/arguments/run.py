@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from services.arguments.parsing import Commands, add_overrides, new_command
+from services.arguments.parsing import Commands, add_insecure, add_overrides, new_command
 
 
 def add(commands: Commands) -> None:
@@ -15,5 +15,6 @@ def add(commands: Commands) -> None:
     parser.add_argument("--record", metavar="FILE", help="recording to write (default: recorder.path)")
     parser.add_argument("--no-record", action="store_true", help="start no recorder")
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout instead of a table")
+    add_insecure(parser)
     add_overrides(parser)
     parser.set_defaults(handler="services.commands.run")

@@ -9,7 +9,9 @@ import sys
 from pathlib import Path
 
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load
+from lsu_mesh.mesh.keys import READER
 from services.bus import SessionSettings
+from services.security import certificates, check_endpoints
 
 DEMO = Path(__file__).resolve().parent.parent / "demo.toml"
 CACHED_SECONDS = 6.0
@@ -48,10 +50,20 @@ def print_problems(error: ConfigurationError) -> None:
 
 
 def session_settings(configuration: Configuration, options: argparse.Namespace) -> SessionSettings:
-    """How a peer of this configuration reaches its mesh: flags first, then ``[network]``."""
+    """How a peer of this configuration reaches its mesh: flags first, then ``[network]``.
+
+    A command that runs no peer of the configuration shows the reader's certificate.
+
+    Raises
+    ------
+    InsecureSession
+        When it would be open to other hosts, or has no certificate where the mesh needs one.
+    """
     network = configuration.network
     connect = options.connect or [network.entry, *network.connect]
-    listen = options.listen or network.listen or ("tcp/127.0.0.1:0",)
+    listen = options.listen or network.listen or (any_port(configuration),)
+    check_endpoints(listen, options.cfg, insecure=options.insecure)
+    name = options.name if getattr(options, "role", None) is not None else READER
     return SessionSettings(
         connect=tuple(endpoint for endpoint in connect if endpoint not in listen),
         listen=tuple(listen),
@@ -59,7 +71,13 @@ def session_settings(configuration: Configuration, options: argparse.Namespace) 
         cache=cache_size(configuration),
         multicast=options.multicast_scouting,
         zenoh=tuple(options.cfg),
+        certificates=certificates(configuration, name),
     )
+
+
+def any_port(configuration: Configuration) -> str:
+    """A free port of the loopback interface."""
+    return f"{'tls' if configuration.network.tls.enabled else 'tcp'}/127.0.0.1:0"
 
 
 def cache_size(configuration: Configuration) -> int:

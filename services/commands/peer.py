@@ -15,6 +15,7 @@ from lsu_mesh.mesh.nodes.schedule import Schedule
 from services.bus import NoSession
 from services.cli import COULD_NOT_START, USAGE
 from services.commands.configuration import load_or_explain, session_settings
+from services.security import InsecureSession
 
 
 def main(options: argparse.Namespace) -> int:
@@ -30,6 +31,9 @@ def main(options: argparse.Namespace) -> int:
         return USAGE
     try:
         return _run(configuration, options)
+    except InsecureSession as error:
+        print(f"{options.role} {options.name}: {error}", file=sys.stderr)
+        return USAGE
     except NoSession as error:
         print(error, file=sys.stderr)
         return COULD_NOT_START

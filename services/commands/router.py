@@ -6,28 +6,54 @@ import argparse
 import sys
 import time
 
+from lsu_mesh.mesh.keys import ROUTER
 from services.bus import Bus, Clock, NoSession, SessionSettings
-from services.cli import COULD_NOT_START, OK
+from services.cli import COULD_NOT_START, OK, USAGE
+from services.commands.configuration import load_or_explain
 from services.peer import LONGEST_WAIT, Stop
+from services.security import InsecureSession, certificates, check_endpoints
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 
 
 def main(options: argparse.Namespace) -> int:
-    settings = SessionSettings(
-        connect=tuple(options.connect),
-        listen=tuple(options.listen) or (DEFAULT_LISTEN,),
-        mode=options.mode or "router",
-        multicast=options.multicast_scouting,
-        zenoh=tuple(options.cfg),
-    )
-    stop = Stop()
     try:
-        with Bus(settings, Clock()):
-            print(f"router: listening on {', '.join(settings.listen)}", file=sys.stderr)
-            while not stop:
-                time.sleep(LONGEST_WAIT)
+        settings = _settings(options)
+        if settings is None:
+            return USAGE
+        return _route(settings)
+    except InsecureSession as error:
+        print(f"router: {error}", file=sys.stderr)
+        return USAGE
     except NoSession as error:
         print(error, file=sys.stderr)
         return COULD_NOT_START
+
+
+def _settings(options: argparse.Namespace) -> SessionSettings | None:
+    """With a configuration: its entry, certificates and rules; None when it has mistakes."""
+    files, default = None, DEFAULT_LISTEN
+    if options.config is not None:
+        configuration = load_or_explain(options.config, options)
+        if configuration is None:
+            return None
+        files, default = certificates(configuration, ROUTER), configuration.network.entry
+    listen = tuple(options.listen) or (default,)
+    check_endpoints(listen, options.cfg, insecure=options.insecure)
+    return SessionSettings(
+        connect=tuple(options.connect),
+        listen=listen,
+        mode=options.mode or "router",
+        multicast=options.multicast_scouting,
+        zenoh=tuple(options.cfg),
+        certificates=files,
+    )
+
+
+def _route(settings: SessionSettings) -> int:
+    stop = Stop()
+    with Bus(settings, Clock()):
+        print(f"router: listening on {', '.join(settings.listen)}", file=sys.stderr)
+        while not stop:
+            time.sleep(LONGEST_WAIT)
     return OK

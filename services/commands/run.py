@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from lsu_mesh.mesh.config import Configuration
-from lsu_mesh.mesh.keys import PREFIX, key, parse
+from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh.mesh.playback import read_playback
 from services.bus import Arrival, Bus, Clock, NoSession, SessionSettings
 from services.cli import COULD_NOT_START, FAILURE, OK, USAGE
-from services.commands.configuration import DEMO, cache_size, flags, load_or_explain, print_warnings
+from services.commands.configuration import DEMO, any_port, cache_size, flags, load_or_explain, print_warnings
 from services.peer import Stop
 from services.report import RunReport
+from services.security import InsecureSession, certificates, check_endpoints
 from services.supervisor import Supervisor
 from services.table import Progress, print_json, print_table
 
@@ -83,19 +84,32 @@ def main(options: argparse.Namespace) -> int:
     print_warnings(configuration)
     stop = Stop()
     clock = Clock()
-    network = configuration.network
-    settings = SessionSettings(
-        connect=network.connect, listen=(network.entry, *network.listen), cache=cache_size(configuration)
-    )
     try:
+        settings = _session_settings(configuration, options)
         with Bus(settings, clock) as bus:
             recording = None if options.no_record else _recording_path(configuration, options)
             supervisor = Supervisor(configuration.supervisor)
             run = Run(configuration, options, supervisor, bus, clock, stop, RunReport(configuration), recording)
             return _supervise(run)
+    except InsecureSession as error:
+        print(f"run: {error}", file=sys.stderr)
+        return USAGE
     except NoSession as error:
         print(error, file=sys.stderr)
         return COULD_NOT_START
+
+
+def _session_settings(configuration: Configuration, options: argparse.Namespace) -> SessionSettings:
+    """The one listener that newcomers find; it reads and publishes nothing."""
+    network = configuration.network
+    listen = (network.entry, *network.listen)
+    check_endpoints(listen, (), insecure=options.insecure)
+    return SessionSettings(
+        connect=network.connect,
+        listen=listen,
+        cache=cache_size(configuration),
+        certificates=certificates(configuration, READER),
+    )
 
 
 def _recording_path(configuration: Configuration, options: argparse.Namespace) -> Path:
@@ -170,7 +184,7 @@ def _is_source(configuration: Configuration, role: str, name: str) -> bool:
 def _arguments(run: Run, role: str) -> list[str]:
     """What a child is started with: the configuration of this run."""
     file = run.options.file if run.options.file is not None else str(DEMO)
-    arguments = ["-c", file, "-e", run.configuration.network.entry]
+    arguments = ["-c", file, "-e", run.configuration.network.entry, "-l", any_port(run.configuration)]
     last = _last_step(run.configuration)
     end = [] if last is None else [f"mesh.steps={last}"]
     for override in [*flags(run.options), *run.options.overrides, *end]:

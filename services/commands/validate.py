@@ -11,6 +11,7 @@ from pathlib import Path
 from lsu_mesh.mesh.config import ConfigurationError, load
 from services.cli import OK, USAGE
 from services.commands.configuration import print_problems, print_warnings
+from services.security import missing_files
 
 
 def main(options: argparse.Namespace) -> int:
@@ -23,6 +24,8 @@ def main(options: argparse.Namespace) -> int:
             print_problems(error)
         return USAGE
     print_warnings(configuration)
+    for missing in missing_files(configuration):
+        print(f"{configuration.path}: warning: {missing}", file=sys.stderr)
     peers = [f"{role} {name}" for role, name in configuration.peers()]
     if options.json:
         print(json.dumps({"valid": True, "mesh": configuration.mesh.name, "peers": peers}))

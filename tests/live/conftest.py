@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,7 @@ from typing import Any
 
 import psutil
 import pytest
+from ports import free_port
 
 
 @dataclass
@@ -52,13 +52,6 @@ class Session:
     def of(self, kind: str) -> list[dict[str, Any]]:
         """JSON lines of a type."""
         return [line for line in self.lines if line["type"] == kind]
-
-
-def free_port() -> int:
-    """A port of the loopback interface that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 Start = Callable[..., Session]

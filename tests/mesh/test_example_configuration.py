@@ -55,7 +55,7 @@ def test_every_option_of_the_schema_is_in_the_example_and_none_besides(example: 
         general(path) for path in shown if path in ("mesh", "model", "plant", "recorder", "network", "supervisor")
     }
     groups = {"sensors", "filters", "fusion", "sensors.*", "filters.*", "fusion.*", "model.prior", "model.domain"}
-    assert shown - known - tables - groups - {"model.input_box"} == set()
+    assert shown - known - tables - groups - {"model.input_box", "network.tls"} == set()
 
 
 def test_the_commented_values_are_valid(example: Path, tmp_path: Path) -> None:

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
 from lsu_mesh.mesh.config.peers import read_filter, read_fusion, read_plant, read_sensor, shared_sensor_warnings
 from lsu_mesh.mesh.config.settings import (
     Configuration,
     MeshSettings,
-    NetworkSettings,
     RecorderSettings,
     SupervisorSettings,
 )
@@ -105,10 +105,12 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     peers = {"filters": list(filter_tables), "fusion": list(fusion_tables)}
     filters = {name: read_filter(table, name, sensors, model, prior, peers) for name, table in filter_tables.items()}
     fusion = {name: read_fusion(table, name, filters, peers) for name, table in fusion_tables.items()}
-    recorder, network = _read_recorder(root), _read_network(root)
+    recorder, network = _read_recorder(root), read_network(root)
     supervisor = _read_supervisor(root)
     root.finish()
-    _check_names([*sensors, *filters, *fusion, *([plant.name] if plant else []), "recorder"], problems)
+    names = [*sensors, *filters, *fusion, *([plant.name] if plant else []), "recorder"]
+    _check_names(names, problems)
+    check_reserved(network, names, problems)
     if any(s.file and s.file.indexed_by == "time" for s in sensors.values()) and mesh.start_time is None:
         problems.add("[mesh] start_time", "is missing; files with a time column need it: step = (t − start_time)/dt")
     if model is None or prior is None:
@@ -118,7 +120,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     return Configuration(
         path, mesh, model, prior, input_box, plant, dict(sorted(sensors.items())), dict(sorted(filters.items())),
         dict(sorted(fusion.items())), recorder, network, supervisor,
-        tuple(shared_sensor_warnings(filters, fusion)),
+        (*shared_sensor_warnings(filters, fusion), *open_endpoint_warnings(network)),
     )  # fmt: skip
 
 
@@ -159,21 +161,6 @@ def _read_recorder(root: Table) -> RecorderSettings:
     axes = tuple(table.texts("axes", []))
     table.finish()
     return RecorderSettings(path, flush, mesh_hz, axes)
-
-
-def _read_network(root: Table) -> NetworkSettings:
-    table = root.table("network")
-    if table is None:
-        return NetworkSettings()
-    entry = table.text("entry", NetworkSettings.entry)
-    listen, connect = tuple(table.texts("listen", [])), tuple(table.texts("connect", []))
-    for key, endpoints in (("entry", (entry,)), ("listen", listen), ("connect", connect)):
-        for endpoint in endpoints:
-            if not endpoint.startswith(("tcp/", "tls/", "udp/", "quic/", "unixsock-stream/")) or ":" not in endpoint:
-                table.wrong(key, f'"{endpoint}" is no endpoint; expected one such as "tcp/127.0.0.1:7447"')
-    cache = table.whole("cache", None, low=1, high=10**6)
-    table.finish()
-    return NetworkSettings(entry, listen, connect, cache)
 
 
 def _read_supervisor(root: Table) -> SupervisorSettings:

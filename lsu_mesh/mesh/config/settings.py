@@ -116,6 +116,18 @@ class RecorderSettings:
 
 
 @dataclass(frozen=True)
+class TlsSettings:
+    """``[network.tls]``; files as written, ``{name}`` stands for the peer."""
+
+    enabled: bool = False
+    authority: str = "keys/ca.pem"
+    certificate: str = "keys/{name}.pem"
+    key: str = "keys/{name}.key"
+    access_control: bool = True
+    verify_hosts: bool = True
+
+
+@dataclass(frozen=True)
 class NetworkSettings:
     """``[network]``; Zenoh endpoints such as ``tcp/127.0.0.1:7447``."""
 
@@ -123,6 +135,7 @@ class NetworkSettings:
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
     cache: int | None = None
+    tls: TlsSettings = field(default_factory=TlsSettings)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.registry import filter_class
+from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import (
     Bounds,
@@ -36,7 +37,7 @@ class FilterNode(Estimator):
     """Runs one filter of the library on the measurements of its sensors."""
 
     role = "filter"
-    publishes = ("prediction", "posterior")
+    publishes = PUBLISHES["filter"]
     answers = ("posterior",)
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
@@ -67,16 +68,7 @@ class FilterNode(Estimator):
         return self.settings.history
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
-        settings = self.configuration.filters[self.name]
-        listed = [("measurement", sensor) for sensor in settings.sensors]
-        if self.configuration.plant is not None and self.configuration.base_model.input_count:
-            listed.append(("input", self.configuration.plant.name))
-        fused = {fusion.name for fusion in self.configuration.fusion.values() if self.name in fusion.sources}
-        if settings.transfer == "fused":
-            fused |= set(settings.transfer_from)
-        elif settings.transfer != "off":
-            listed += [("prediction", name) for name in settings.transfer_from]
-        return [*listed, *(("fused", name) for name in sorted(fused))]
+        return subscriptions(self.configuration, self.role, self.name)
 
     def receive(self, message: Message, now: int) -> list[Message]:
         if isinstance(message, Measurement):

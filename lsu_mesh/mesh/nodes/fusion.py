@@ -12,6 +12,7 @@ from msgspec import structs
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.fusion.fuse import fuse
+from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Fused, Health, Input, Message, Posterior, Rejection, SupportMessage
 from lsu_mesh.mesh.nodes.estimator import Combined, Estimator, Status, Step, finite_or_none
@@ -56,7 +57,7 @@ class FusionNode(Estimator):
     """``fused_k = ∩ posteriors_k ∩ (own prediction of k)`` as a constrained zonotope of limited complexity."""
 
     role = "fusion"
-    publishes = ("fused",)
+    publishes = PUBLISHES["fusion"]
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         self.settings = configuration.fusion[name]
@@ -86,11 +87,7 @@ class FusionNode(Estimator):
         return self.settings.max_lag
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
-        fusions = self.configuration.fusion
-        listed = [("fused" if name in fusions else "posterior", name) for name in fusions[self.name].sources]
-        if self.configuration.plant is not None and self.configuration.base_model.input_count:
-            listed.append(("input", self.configuration.plant.name))
-        return listed
+        return subscriptions(self.configuration, self.role, self.name)
 
     def receive(self, message: Message, now: int) -> list[Message]:
         if isinstance(message, Input):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lsu_mesh.mesh.access import PUBLISHES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Input, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
@@ -27,7 +28,7 @@ class PlantNode(Node):
     """
 
     role = "plant"
-    publishes = ("truth", "input")
+    publishes = PUBLISHES["plant"]
 
     def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
         super().__init__(configuration, name, boot)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration, SensorFault
 from lsu_mesh.mesh.messages import Measurement, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
@@ -21,7 +22,7 @@ class SimulatedSensorNode(Node):
     """``y = C x + v`` with v a function of (seed, name, step), and the faults of its configuration."""
 
     role = "sensor"
-    publishes = ("measurement",)
+    publishes = PUBLISHES["sensor"]
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         super().__init__(configuration, name, boot)
@@ -31,8 +32,7 @@ class SimulatedSensorNode(Node):
         self._stuck: dict[SensorFault, Vector] = {}
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
-        assert self.configuration.plant is not None
-        return (("truth", self.configuration.plant.name),)
+        return subscriptions(self.configuration, self.role, self.name)
 
     def rehearse(self) -> None:
         settings = self._settings
@@ -83,7 +83,7 @@ class FileSensorNode(Node):
     """
 
     role = "sensor"
-    publishes = ("measurement",)
+    publishes = PUBLISHES["sensor"]
 
     def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
         super().__init__(configuration, name, boot)

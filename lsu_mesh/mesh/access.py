@@ -1,0 +1,89 @@
+"""Who publishes, reads, asks and answers what: from the configuration alone, for the nodes and for access control."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.keys import TOPICS, key, last_key, model_key
+
+PUBLISHES = {
+    "plant": ("truth", "input"),
+    "sensor": ("measurement",),
+    "filter": ("prediction", "posterior"),
+    "fusion": ("fused",),
+    "recorder": (),
+}
+"""Topics of each role, besides those of every peer."""
+EVERY_PEER = ("health", "event")
+
+
+class Access(NamedTuple):
+    """Key expressions of one peer."""
+
+    publishes: tuple[str, ...]
+    reads: tuple[str, ...]
+    asks: tuple[str, ...]
+    answers: tuple[str, ...]
+
+
+def subscriptions(configuration: Configuration, role: str, name: str) -> list[tuple[str, str]]:
+    """``(topic, name)`` of everything that a node listens to."""
+    if role == "sensor":
+        return _truth(configuration) if configuration.sensors[name].file is None else []
+    if role == "filter":
+        return _of_filter(configuration, name)
+    if role == "fusion":
+        sources = configuration.fusion[name].sources
+        listed = [("fused" if source in configuration.fusion else "posterior", source) for source in sources]
+        return [*listed, *_inputs(configuration)]
+    return []
+
+
+def access(configuration: Configuration, role: str, name: str) -> Access:
+    """All that a peer of the configuration may do on the mesh."""
+    mesh = configuration.mesh.name
+    topics = (*PUBLISHES[role], *EVERY_PEER)
+    if role == "recorder":
+        reads = tuple(key(mesh, topic, "*") for topic in TOPICS if topic != "live")
+    else:
+        reads = tuple(key(mesh, topic, other) for topic, other in subscriptions(configuration, role, name))
+    asks = (model_key(mesh), *((last_key(mesh, name),) if role == "filter" else ()))
+    return Access(tuple(key(mesh, topic, name) for topic in topics), reads, asks, _answers(configuration, role, name))
+
+
+def reader_access(configuration: Configuration) -> Access:
+    """What a subscriber may do: read all, ask all, publish nothing."""
+    mesh = configuration.mesh.name
+    reads = tuple(key(mesh, topic, "*") for topic in TOPICS if topic != "live")
+    return Access((), reads, (model_key(mesh), last_key(mesh, "*")), ())
+
+
+def _answers(configuration: Configuration, role: str, name: str) -> tuple[str, ...]:
+    """Queries that a peer answers, besides those on what it publishes."""
+    mesh = configuration.mesh.name
+    if role == "fusion":
+        return (model_key(mesh), *(last_key(mesh, source) for source in configuration.fusion[name].sources))
+    return (model_key(mesh),) if role == "filter" and not configuration.fusion else ()
+
+
+def _truth(configuration: Configuration) -> list[tuple[str, str]]:
+    assert configuration.plant is not None, "a simulated sensor has a plant"
+    return [("truth", configuration.plant.name)]
+
+
+def _inputs(configuration: Configuration) -> list[tuple[str, str]]:
+    has_inputs = configuration.plant is not None and configuration.base_model.input_count > 0
+    return [("input", configuration.plant.name)] if configuration.plant is not None and has_inputs else []
+
+
+def _of_filter(configuration: Configuration, name: str) -> list[tuple[str, str]]:
+    """Measurements, inputs, fused sets of the fusions that use the filter, and what is transferred to it."""
+    settings = configuration.filters[name]
+    listed = [*(("measurement", sensor) for sensor in settings.sensors), *_inputs(configuration)]
+    fused = {fusion.name for fusion in configuration.fusion.values() if name in fusion.sources}
+    if settings.transfer == "fused":
+        fused |= set(settings.transfer_from)
+    elif settings.transfer != "off":
+        listed += [("prediction", source) for source in settings.transfer_from]
+    return [*listed, *(("fused", fusion) for fusion in sorted(fused))]
