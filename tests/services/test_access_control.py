@@ -19,10 +19,9 @@ def rules(demo: Path) -> dict[str, Any]:
 def of(rules: dict[str, Any], name: str, message: str, flow: str) -> set[str]:
     """Key expressions of what a name may send (ingress) or be sent (egress)."""
     (policy,) = [policy for policy in rules["policies"] if policy["subjects"] == [name]]
-    chosen = [rule for rule in rules["rules"] if rule["id"] in policy["rules"]]
-    return {
-        key for rule in chosen if message in rule["messages"] and flow in rule["flows"] for key in rule["key_exprs"]
-    }
+    own = [rule for rule in rules["rules"] if rule["id"] in policy["rules"]]
+    chosen = [rule for rule in own if message in rule["messages"] and flow in rule["flows"]]
+    return {key for rule in chosen for key in rule["key_exprs"]}
 
 
 def test_what_is_not_allowed_is_denied_and_identities_are_unique(rules: dict[str, Any]) -> None:
