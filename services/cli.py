@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 
 from services.arguments import bench, keys, peer, reproduce, run, validate, view
 from services.arguments.parsing import EXIT_CODES
+from services.stop import Stop
 
 OK, FAILURE, USAGE, COULD_NOT_START, NOT_MET = 0, 1, 2, 3, 4
 GROUPS = (run, peer, validate, keys, view, reproduce, bench)
@@ -40,6 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     import importlib
 
     options = build_parser().parse_args(arguments)
+    if getattr(options, "runs_until_stopped", False):
+        options.stop = Stop()  # before the imports of the command, which take a while
     handler: Callable[[argparse.Namespace], int] = importlib.import_module(options.handler).main
     try:
         return handler(options)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
 from collections.abc import Iterable
-from types import FrameType
 
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Message, encode, encoding
@@ -15,44 +12,21 @@ from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
 from services.bus import Arrival, Bus, Clock, SessionSettings
+from services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
 LONGEST_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
 
-class Stop:
-    """Set by the first SIGINT or SIGTERM; the second SIGINT ends the process at once with code 130."""
-
-    def __init__(self) -> None:
-        self.is_set = False
-        self._interrupts = 0
-        self._parent = int(os.environ.get("LSU_MESH_PARENT", "0"))
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._handle)
-
-    def _handle(self, number: int, frame: FrameType | None) -> None:
-        self.is_set = True
-        if number == signal.SIGINT:
-            self._interrupts += 1
-            if self._interrupts > 1:
-                os._exit(130)
-
-    def is_orphan(self) -> bool:
-        """Whether the supervisor that started this process is gone."""
-        return self._parent != 0 and os.getppid() != self._parent
-
-    def __bool__(self) -> bool:
-        return self.is_set or self.is_orphan()
-
-
-def run_node(node: Node, settings: SessionSettings) -> int:
+def run_node(node: Node, settings: SessionSettings, stop: Stop) -> int:
     """Run a node until it is told to stop; returns the exit code."""
-    stop, clock = Stop(), Clock()
+    clock = Clock()
     node.rehearse()
     with Bus(settings, clock) as bus:
         peer = Peer(node, bus, clock)
         peer.declare()
+        print(f"{node.role} {node.name}: on the mesh", file=sys.stderr)
         said_finished = False
         while not stop:
             peer.turn()

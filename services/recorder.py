@@ -14,18 +14,18 @@ from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from services.bus import Arrival, Bus, Clock, SessionSettings
 from services.cli import COULD_NOT_START, OK
-from services.peer import Stop
 from services.recording.recorder import Recorder
 from services.recording.stream import next_part
+from services.stop import Stop
 
 ROLE_NAME = "recorder"
 AFTER_STOP_S = 0.5
 """How long the recorder goes on taking what is under way after it was told to stop."""
 
 
-def run_recorder(configuration: Configuration, record: str | None, settings: SessionSettings) -> int:
+def run_recorder(configuration: Configuration, record: str | None, settings: SessionSettings, stop: Stop) -> int:
     """Record until told to stop; returns the exit code."""
-    stop, clock = Stop(), Clock()
+    clock = Clock()
     template = record or configuration.recorder.path
     moment = time.strftime("%Y%m%d-%H%M%S")
     path = Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
@@ -44,6 +44,7 @@ def run_recorder(configuration: Configuration, record: str | None, settings: Ses
         with Bus(settings, clock) as bus:
             service = RecorderService(configuration, recorder, bus, clock)
             service.declare()
+            print(f"recorder: on the mesh, writing {part}", file=sys.stderr)
             while not stop:
                 service.turn()
             end = time.monotonic() + AFTER_STOP_S

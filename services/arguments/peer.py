@@ -48,7 +48,7 @@ def _add_peer(commands: Commands, role: str, words: str) -> None:
         parser.add_argument("--record", metavar="FILE", help="recording to write (default: recorder.path)")
     add_overrides(parser)
     add_network(parser)
-    parser.set_defaults(handler="services.commands.peer", role=role)
+    parser.set_defaults(handler="services.commands.peer", runs_until_stopped=True, role=role)
 
 
 def _add_router(commands: Commands) -> None:
@@ -59,4 +59,4 @@ def _add_router(commands: Commands) -> None:
     )
     add_overrides(parser)
     add_network(parser)
-    parser.set_defaults(handler="services.commands.router")
+    parser.set_defaults(handler="services.commands.router", runs_until_stopped=True)

@@ -17,4 +17,4 @@ def add(commands: Commands) -> None:
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout instead of a table")
     add_insecure(parser)
     add_overrides(parser)
-    parser.set_defaults(handler="services.commands.run")
+    parser.set_defaults(handler="services.commands.run", runs_until_stopped=True)

@@ -44,10 +44,10 @@ def _run(configuration: Configuration, options: argparse.Namespace) -> int:
     if options.role == "recorder":
         from services.recorder import run_recorder
 
-        return run_recorder(configuration, options.record, settings)
+        return run_recorder(configuration, options.record, settings, options.stop)
     from services.peer import run_node
 
-    return run_node(make_node(configuration, options), settings)
+    return run_node(make_node(configuration, options), settings, options.stop)
 
 
 def _schedule(options: argparse.Namespace, rate: float) -> Schedule:

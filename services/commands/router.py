@@ -10,8 +10,9 @@ from lsu_mesh.mesh.keys import ROUTER
 from services.bus import Bus, Clock, NoSession, SessionSettings
 from services.cli import COULD_NOT_START, OK, USAGE
 from services.commands.configuration import load_or_explain
-from services.peer import LONGEST_WAIT, Stop
+from services.peer import LONGEST_WAIT
 from services.security import InsecureSession, certificates, check_endpoints
+from services.stop import Stop
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 
@@ -21,7 +22,7 @@ def main(options: argparse.Namespace) -> int:
         settings = _settings(options)
         if settings is None:
             return USAGE
-        return _route(settings)
+        return _route(settings, options.stop)
     except InsecureSession as error:
         print(f"router: {error}", file=sys.stderr)
         return USAGE
@@ -50,8 +51,7 @@ def _settings(options: argparse.Namespace) -> SessionSettings | None:
     )
 
 
-def _route(settings: SessionSettings) -> int:
-    stop = Stop()
+def _route(settings: SessionSettings, stop: Stop) -> int:
     with Bus(settings, Clock()):
         print(f"router: listening on {', '.join(settings.listen)}", file=sys.stderr)
         while not stop:

@@ -15,9 +15,9 @@ from lsu_mesh.mesh.playback import read_playback
 from services.bus import Arrival, Bus, Clock, NoSession, SessionSettings
 from services.cli import COULD_NOT_START, FAILURE, OK, USAGE
 from services.commands.configuration import DEMO, any_port, cache_size, flags, load_or_explain, print_warnings
-from services.peer import Stop
 from services.report import RunReport
 from services.security import InsecureSession, certificates, check_endpoints
+from services.stop import Stop
 from services.supervisor import Supervisor
 from services.table import Progress, print_json, print_table
 
@@ -82,7 +82,7 @@ def main(options: argparse.Namespace) -> int:
     if configuration is None:
         return USAGE
     print_warnings(configuration)
-    stop = Stop()
+    stop: Stop = options.stop
     clock = Clock()
     try:
         settings = _session_settings(configuration, options)

@@ -77,7 +77,7 @@ def start(lsu_mesh_command: list[str], root: Path, tmp_path: Path) -> Iterator[S
     for session in started:
         for process in [*session.children(), *([session.process] if session.process.poll() is None else [])]:
             process.kill()
-        session.process.wait()
+        session.process.communicate()
 
 
 ON_PORT = ("-X", "network.entry={endpoint}")
