@@ -10,7 +10,17 @@ class LsuMeshError(Exception):
 
 
 class ModelError(LsuMeshError, ValueError):
-    """A model, a set or an option is malformed; the message names the field, the value and the remedy."""
+    """A model, a set or an option is malformed; the message names the field, the value and the remedy.
+
+    Attributes
+    ----------
+    problems:
+        Each mistake by itself, where several were found together.
+    """
+
+    def __init__(self, *problems: str) -> None:
+        super().__init__("; ".join(problems))
+        self.problems = problems
 
 
 class InconsistentData(LsuMeshError):

@@ -86,7 +86,7 @@ class LSUModel:
         self.outputs = _names("outputs", outputs, self.C.shape[0], "y", problems)
         self.units = _names("units", units, n, "", problems)
         if problems:
-            raise ModelError("; ".join(problems))
+            raise ModelError(*problems)
 
     @staticmethod
     def _domain(

@@ -54,6 +54,23 @@ def test_all_mistakes_are_told_at_once(problems: Problems) -> None:
     assert 'mesh.toml: recorde: unknown key; did you mean "recorder"?' in text
 
 
+def test_all_mistakes_of_a_model_are_told_at_once_and_sensors_are_checked_beside_them(problems: Problems) -> None:
+    found = problems(
+        ("rho = [0.1, 0.1, 0.1]", 'rho = [0.1]\nstates = ["a", "b"]'),
+        ("upper = [5.0, 5.0, 5.0]", "upper = [-9.0, 5.0, 5.0]"),
+        ("C = [[1.0, 0.0, 0.5]]", "C = [[1.0, 0.0]]"),
+    )
+    expected = (
+        "[model.prior]: lower must",
+        "[model]: rho must have 3",
+        "[model]: states must have 3",
+        "[sensors.s1] C: expected 3",
+    )
+    assert len(found) == len(expected), found
+    for line, words in zip(found, expected, strict=True):
+        assert line.startswith(f"mesh.toml: {words}"), line
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [

@@ -95,10 +95,11 @@ def _apply(values: dict[str, Any], changes: Sequence[tuple[str, str]], source: s
 def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configuration | None:
     root = Table(values, "", problems)
     mesh = _read_mesh(root)
-    model, prior, input_box = read_model(root.table("model", required=True), problems)
-    count = None if model is None else model.state_count
+    system = read_model(root.table("model", required=True), problems)
+    model, prior, input_box = system.model, system.prior, system.input_box
     sensors = {
-        name: read_sensor(table, name, count, path.parent) for name, table in _named(root, "sensors", problems).items()
+        name: read_sensor(table, name, system.state_count, path.parent)
+        for name, table in _named(root, "sensors", problems).items()
     }
     plant = read_plant(root.table("plant"), model, sensors, path.parent, problems)
     filter_tables, fusion_tables = _named(root, "filters", problems), _named(root, "fusion", problems)

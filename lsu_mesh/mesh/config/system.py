@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from lsu_mesh.errors import ModelError
@@ -10,33 +11,51 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
 
-def read_model(table: Table | None, problems: Problems) -> tuple[LSUModel | None, Orthotope | None, Orthotope | None]:
-    """The model without outputs, the prior of x_1 and the box of unknown inputs."""
+@dataclass(frozen=True)
+class System:
+    """What ``[model]`` says, as far as it could be read.
+
+    ``model`` is without outputs, ``prior`` holds x_1, ``input_box`` holds inputs that are unknown; each is ``None``
+    where it is missing or wrong. ``state_count`` is that of A, so that other tables can be checked all the same.
+    """
+
+    model: LSUModel | None = None
+    prior: Orthotope | None = None
+    input_box: Orthotope | None = None
+    state_count: int | None = None
+
+
+def read_model(table: Table | None, problems: Problems) -> System:
+    """The table ``[model]``; notes all its mistakes."""
     if table is None:
-        return None, None, None
+        return System()
     before = len(problems.lines)
     A, B, rho = table.matrix("A"), table.matrix("B", None), _widths(table)
     noise_map = table.matrix("noise_map", None)
+    names = {key: table.texts(key, None) for key in ("states", "inputs", "units")}
+    is_read = len(problems.lines) == before
     domain = read_box(table.table("domain"), problems)
     input_box = read_box(table.table("input_box"), problems)
     prior = read_box(table.table("prior", required=True), problems)
-    names = {key: table.texts(key, None) for key in ("states", "inputs", "units")}
     table.finish()
-    if len(problems.lines) > before:
-        return None, prior, input_box
+    if not isinstance(A, list):
+        return System(prior=prior, input_box=input_box)
+    count = len(A)
+    _check_box("prior", prior, count, "state", problems)
+    _check_box("input_box", input_box, len(B[0]) if isinstance(B, list) else 0, "input", problems)
+    if not is_read:
+        return System(None, prior, input_box, count)
     try:
-        model = LSUModel(A, B, [], rho, [], noise_map, domain, **names)
+        return System(LSUModel(A, B, [], rho, [], noise_map, domain, **names), prior, input_box, count)
     except ModelError as error:
-        problems.add("[model]", str(error))
-        return None, prior, input_box
-    if prior is not None and prior.dim != model.state_count:
-        problems.add("[model.prior]", f"expected {model.state_count} coordinates, one per state, found {prior.dim}")
-    if input_box is not None and input_box.dim != model.input_count:
-        problems.add(
-            "[model.input_box]",
-            f"expected {model.input_count} coordinates, one per input, found {input_box.dim}",
-        )
-    return model, prior, input_box
+        for problem in error.problems:
+            problems.add("[model]", problem)
+        return System(None, prior, input_box, count)
+
+
+def _check_box(key: str, box: Orthotope | None, count: int, of: str, problems: Problems) -> None:
+    if box is not None and box.dim != count:
+        problems.add(f"[model.{key}]", f"expected {count} coordinates, one per {of}, found {box.dim}")
 
 
 def _widths(table: Table) -> Any:
