@@ -85,6 +85,18 @@ class Filter(ABC):
     def reset(self, support: Support) -> None:
         """Start again from a set that is known to hold the state now."""
 
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+        """Go on from what a filter of this class said: its :attr:`support` and its :meth:`bounds` (n,), (n,).
+
+        The later sets are those of that filter, bit by bit, if :attr:`is_resumable`.
+        """
+        self.reset(support)
+
+    @property
+    def is_resumable(self) -> bool:
+        """Whether support and bounds are all that later sets depend on."""
+        return True
+
     @abstractmethod
     def snapshot(self) -> object:
         """The state of the filter as an immutable value, for :meth:`restore`."""

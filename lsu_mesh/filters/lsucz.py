@@ -166,7 +166,7 @@ class LSUCZ(Filter):
         arrays = self._arrays if model is None else kernel_model(used)
         center, half_widths = input_interval(u, used.input_count)
         widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
-        body, lower, upper, _ = self._held
+        body, (lower, upper) = self._held.body, self.bounds()
         if not self._limits.allow(body):
             body, lower, upper, _ = self._settled(body, lower, upper)
         finite, body, lower, upper = predict_constrained(
@@ -206,6 +206,11 @@ class LSUCZ(Filter):
         body = given.to_constrained_zonotope().arrays
         lower, upper = given.bounds()
         self._hold(Held(body, lower, upper, True) if self._limits.allow(body) else self._settled(body, lower, upper))
+
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+        """Go on from the set and the box as they are, bit by bit."""
+        body = checked_prior(self._model, support).to_constrained_zonotope().arrays
+        self._hold(Held(body, lower, upper, is_hull=True))
 
     def snapshot(self) -> Held:
         """The set and the box; neither is ever written again."""

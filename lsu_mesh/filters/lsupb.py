@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.kernels import step
 from lsu_mesh.model import LSUModel
@@ -15,6 +16,7 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
 
+Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 
@@ -42,6 +44,13 @@ class LSUPB(CompiledFilter):
 
     def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike]) -> None:
         super().__init__(model, prior, option=0)
+
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+        """Go on from the parallelotope in ``support`` and the box, bit by bit."""
+        body = next((part for part in getattr(support, "parts", ()) if isinstance(part, Parallelotope)), None)
+        if body is None:
+            raise ModelError(f"{self.kind} goes on from an intersection with a parallelotope, not from {support!r}")
+        self._state = np.vstack([body.center, body.generators, lower, upper])
 
     @staticmethod
     def _enclose(support: Support) -> Matrix:

@@ -202,6 +202,17 @@ class ZonotopicKalman(Filter):
         H = H if self._order is None else box_shortest(H, self._order)
         self._held = Held(c, H, *given.bounds(), _no_strips(c.size))
 
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+        """Go on from a zonotope and a box; in the predictor form data that wait have to be given again."""
+        if not isinstance(support, Zonotope):
+            raise ModelError(f"{self.kind} goes on from a zonotope, not from {support!r}")
+        self._held = Held(support.center.copy(), support.generators.copy(), lower, upper, _no_strips(lower.size))
+
+    @property
+    def is_resumable(self) -> bool:
+        """In the predictor form the step's data wait, beside the set, for the time update."""
+        return self._form == "filter"
+
     def snapshot(self) -> Held:
         """Zonotope, box and waiting data; none is ever written again."""
         return self._held

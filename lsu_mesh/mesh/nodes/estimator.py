@@ -289,7 +289,8 @@ class Estimator(Node):
             self._restarted = False
         self._used = (*self._used, *combined.used)
         is_first = step.published is None
-        may_skip = combined.status in ("ok", "predicted") and len(self._used) < MOST_USED
+        # "domain" is no message that says its step: the first posterior since then is always published.
+        may_skip = combined.status in ("ok", "predicted") and len(self._used) < MOST_USED and self._base != "domain"
         if is_first and self._is_behind() and may_skip:
             self._counts["behind"] += 1
             return messages

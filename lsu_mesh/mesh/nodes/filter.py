@@ -111,7 +111,10 @@ class FilterNode(Estimator):
         missing = [name for name in self.sources if name not in step.arrived]
         messages = [] if self.abandoned is None else self._leave_epoch(k, y, now)
         transferred, gain, told = self._bring_transfers(k, step, now)
+        epoch = self.epoch
         status, cause, complaints = self._update(k, y, now)
+        if self.epoch > epoch:  # reset: what was transferred went into the set that was given up
+            transferred, gain = [], None
         if self.abandoned is not None:
             status, cause = "inconsistent", f"descends from an epoch that {self.abandoned} has abandoned"
         combined = Combined(status, [*transferred, *used], missing, origin, cause, gain)
@@ -215,6 +218,7 @@ class FilterNode(Estimator):
         count = self.settings.reset_after
         words = self._restart(k, y)
         if words:
+            self.engine.update(y)
             text = f"step {k}: {count} steps in a row contradicted the set; started again from {words}"
             return self.event("ERROR", "reset", text, now, k, {"step": k, "epoch": self.epoch})
         text = (
@@ -235,7 +239,10 @@ class FilterNode(Estimator):
         return [self.event("ERROR", "epoch-lost", text, now, k, {"source": source, "step": k})]
 
     def _restart(self, k: int, y: Vector) -> str:
-        """Hold, in a new epoch, the step's fused set or the domain, whichever meets the data; "" where neither does."""
+        """Hold, in a new epoch, the step's fused set or the domain, whichever meets the data; "" where neither does.
+
+        The data themselves are not brought to it yet.
+        """
         fused, domain = self._fused, self.engine.model.domain
         candidates: list[tuple[Support, Base, str]] = []
         if fused is not None and fused.step == k and fused.epoch == self.epoch_of(fused.src):
@@ -245,11 +252,13 @@ class FilterNode(Estimator):
         before = self.engine.snapshot()
         for support, base, words in candidates:
             self.engine.reset(support)
+            start = self.engine.snapshot()
             try:
                 self.engine.update(y)
             except InconsistentData:
                 self.engine.restore(before)
                 continue
+            self.engine.restore(start)
             self.begin_epoch(base)
             if fused is not None and base == fused.reference:
                 self.rely(fused)

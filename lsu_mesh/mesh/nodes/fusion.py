@@ -140,6 +140,7 @@ class FusionNode(Estimator):
             outcome = self._intersected(k, sources, now)
         else:
             outcome = Outcome("predicted", [])
+        self.engine.resume(self.engine.support, *self._met)  # what is published is all that the next step depends on
         agreeing = sources if outcome.status != "inconsistent" else []
         messages = [*outcome.messages, *self._note_rejected(k, agreeing, now)]
         for source in outcome.used:
