@@ -221,7 +221,7 @@ class Posterior(Message, frozen=True, kw_only=True):
     revision: Count
     epoch: Count
     guarantee: Guarantee
-    base: Reference | Literal["prior", "domain"]
+    base: Reference | Literal["prior", "domain", "sources"]
     used: Annotated[list[Reference], Meta(max_length=4096)]
     bounds: Bounds
     missing: Annotated[list[Text], Meta(max_length=4096)]

@@ -32,7 +32,7 @@ from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
 
-Base = Reference | Literal["prior", "domain"]
+Base = Reference | Literal["prior", "domain", "sources"]
 Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 START_GRACE = SECOND // 2
 """How long a late joiner listens to the past before it chooses where to start."""
@@ -249,7 +249,7 @@ class Estimator(Node):
                 messages += self._close(k, step, now)
             if not self._predict(k, step, now):
                 break
-            if not self._is_behind():
+            if step.published is not None and not self._is_behind():
                 messages += self.prediction(k + 1, now)
         return messages
 

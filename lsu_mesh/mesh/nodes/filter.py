@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from lsu_mesh.errors import InconsistentData
+from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
@@ -268,19 +270,11 @@ class FilterNode(Estimator):
     # -- messages out
 
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
-        lower, upper = self.engine.bounds()
-        own = self.engine.support
-        is_plain = isinstance(own, Orthotope | Parallelotope)
-        log_volume = own.log_volume() if is_plain else Orthotope(lower, upper).log_volume()
         return Posterior(
             **self.stamp("posterior", k, now, combined.origin),
+            **described(self.engine),
             kind=self.settings.kind,
             support=support,
-            lower=lower.tolist(),
-            upper=upper.tolist(),
-            point=self.engine.point.tolist(),
-            log_volume=finite_or_none(log_volume),
-            volume_of="support" if is_plain else "hull",
             status=combined.status,
             revision=step.revision,
             epoch=self.epoch,
@@ -298,18 +292,40 @@ class FilterNode(Estimator):
         return Bounds(rho=model.rho.tolist(), r=(model.r * (self._widened or 1.0)).tolist())
 
     def prediction(self, k: int, now: int) -> list[Message]:
-        lower, upper = self.engine.bounds()
-        band = self.engine.predict_output()
         return [
             Prediction(
                 **self.stamp("prediction", k, now),
+                **foretold(self.engine),
                 support=to_message(self.engine.support),
-                lower=lower.tolist(),
-                upper=upper.tolist(),
-                y_lower=band.lower.tolist(),
-                y_upper=band.upper.tolist(),
-                y_point=band.point.tolist(),
                 epoch=self.epoch,
                 guarantee=self.guarantee,
             )
         ]
+
+
+def described(engine: Filter) -> dict[str, Any]:
+    """What a posterior says of the engine's set, beside the set itself."""
+    lower, upper = engine.bounds()
+    own = engine.support
+    is_plain = isinstance(own, Orthotope | Parallelotope)
+    log_volume = own.log_volume() if is_plain else Orthotope(lower, upper).log_volume()
+    return {
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
+        "point": engine.point.tolist(),
+        "log_volume": finite_or_none(log_volume),
+        "volume_of": "support" if is_plain else "hull",
+    }
+
+
+def foretold(engine: Filter) -> dict[str, Any]:
+    """What a prediction says of the engine's set, beside the set itself."""
+    lower, upper = engine.bounds()
+    band = engine.predict_output()
+    return {
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
+        "y_lower": band.lower.tolist(),
+        "y_upper": band.upper.tolist(),
+        "y_point": band.point.tolist(),
+    }

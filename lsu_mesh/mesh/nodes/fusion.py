@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -203,7 +204,7 @@ class FusionNode(Estimator):
             cause = "own prediction was disjoint from what the sources agree on"
         else:
             cause = f"{self.abandoned} has abandoned its epoch"
-        self.begin_epoch(sources[0].message.reference)
+        self.begin_epoch("sources")
         event = self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now, k, {"step": k})
         return Outcome("restarted", sources, cause, [event])
 
@@ -296,16 +297,11 @@ class FusionNode(Estimator):
         return self._met
 
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
-        lower, upper = self._met
         return Fused(
             **self.stamp("fused", k, now, combined.origin),
+            **described(*self._met),
             kind="fusion",
             support=support,
-            lower=lower.tolist(),
-            upper=upper.tolist(),
-            point=(lower + 0.5 * (upper - lower)).tolist(),
-            log_volume=finite_or_none(Orthotope(lower, upper).log_volume()),
-            volume_of="hull",
             status=combined.status,
             revision=step.revision,
             epoch=self.epoch,
@@ -320,3 +316,14 @@ class FusionNode(Estimator):
             rejected=self._rejected,
             quarantined=sorted(self._quarantine.members),
         )
+
+
+def described(lower: Vector, upper: Vector) -> dict[str, Any]:
+    """What a fused set's message says of its bounds (n,), (n,)."""
+    return {
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
+        "point": (lower + 0.5 * (upper - lower)).tolist(),
+        "log_volume": finite_or_none(Orthotope(lower, upper).log_volume()),
+        "volume_of": "hull",
+    }

@@ -1,0 +1,146 @@
+"""Where the truth is recorded: whether the sets hold it, and whether what they rest on was true.
+
+A set must hold the true state if the declared bounds were kept by everything that it descends from. Measurements whose
+noise exceeds its declared half-width are found by exact arithmetic; sets that rest on one are counted apart. A relaxed
+fusion may rest on as many wrong sources as it allows.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import NamedTuple
+
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.messages import Fused, Measurement, Message, Posterior, Prediction, Reference
+from lsu_mesh.mesh.sets import to_support
+from lsu_mesh.mesh.verification.archive import Archive, Unverifiable
+
+
+class Miss(NamedTuple):
+    """A set that does not hold the true state."""
+
+    peer: str
+    topic: str
+    step: int
+    seq: int
+    state: str
+
+    def __str__(self) -> str:
+        return f"{self.peer}, step {self.step}, {self.topic} {self.seq} misses the truth: {self.state}"
+
+
+@dataclass
+class Containment:
+    """``holding`` sets hold the truth; ``misses`` must and do not; ``excused`` rest on something that was not true."""
+
+    configuration: Configuration | None = None
+    archive: Archive = field(default_factory=lambda: Archive([]))
+    holding: int = 0
+    misses: list[Miss] = field(default_factory=list)
+    excused: Counter[str] = field(default_factory=Counter)
+    """Sets that miss the truth, by what they rest on."""
+    broken: dict[str, str] = field(default_factory=dict)
+    """By sensor: the first measurement that is farther from the truth than declared."""
+    _reasons: dict[Reference, str] = field(default_factory=dict)
+    """Sets that rest on something that was not true, and on what."""
+    _measured: dict[Reference, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, configuration: Configuration, archive: Archive) -> Containment:
+        """For the sets of a recording."""
+        return cls(configuration, archive)
+
+    def look(self, message: Posterior | Prediction) -> None:
+        """Check one set, after all that it was made from."""
+        truth = self.archive.truth.get(message.step)
+        reason = self._reason(message)
+        if reason:
+            self._reasons[message.reference] = reason
+        if truth is None:
+            return
+        outside = self._outside(message, truth)
+        if not outside:
+            self.holding += 1
+        elif reason:
+            self.excused[reason] += 1
+        else:
+            self.misses.append(Miss(message.src, message.topic, message.step, message.seq, outside))
+
+    def _outside(self, message: Posterior | Prediction, x: list[float]) -> str:
+        """Words that say how the truth is outside of a set; "" where it is not."""
+        assert self.configuration is not None
+        states = self.configuration.base_model.states
+        for name, low, value, high in zip(states, message.lower, x, message.upper, strict=True):
+            if not low <= value <= high:
+                return f"{name} = {value!r} is not in [{low!r}, {high!r}]"
+        if not to_support(message.support).contains(x):
+            return f"x = {x!r} is proved to lie outside of the support"
+        return ""
+
+    def _reason(self, message: Posterior | Prediction) -> str:
+        """What a set rests on that was not true; "" where everything was."""
+        if message.guarantee != "declared":
+            return f"guarantee {message.guarantee!r}"
+        if isinstance(message, Prediction):
+            try:
+                return self._reasons.get(self.archive.posterior_before(message).reference, "")
+            except Unverifiable:
+                return "what is not in the recording"
+        base = self._base_reason(message)
+        used = [reason for reference in message.used if (reason := self._used_reason(reference))]
+        if isinstance(message, Fused) and message.policy == "relaxed":
+            used = used[message.faults :] if not _spans_steps(message, self.archive) else used
+        return base or next(iter(used), "")
+
+    def _base_reason(self, message: Posterior) -> str:
+        assert self.configuration is not None
+        truth = self.archive.truth
+        if message.base == "prior":
+            x, prior = truth.get(1), self.configuration.prior
+            return "" if x is None or prior.contains(x) else "the prior, which misses the true state of step 1"
+        if message.base in ("domain", "sources"):
+            return ""
+        reference = message.base
+        return self._reasons.get(reference, "") if isinstance(reference, tuple) else ""
+
+    def _used_reason(self, reference: Reference) -> str:
+        if reference[0] != "measurement":
+            return self._reasons.get(reference, "")
+        if reference not in self._measured:
+            try:
+                message = self.archive.find(reference, Measurement)
+            except Unverifiable:
+                self._measured[reference] = "what is not in the recording"
+            else:
+                self._measured[reference] = self._noise_reason(message)
+        return self._measured[reference]
+
+    def _noise_reason(self, message: Measurement) -> str:
+        """Names the sensor whose measurement is farther from the truth than its r, in exact arithmetic."""
+        assert self.configuration is not None
+        sensor, x = self.configuration.sensors[message.name], self.archive.truth.get(message.step)
+        if x is None:
+            return ""
+        for row, r, y, output in zip(sensor.C, sensor.r, message.y, sensor.outputs, strict=True):
+            if y is None:
+                continue
+            noise = Fraction(y) - sum((Fraction(c) * Fraction(v) for c, v in zip(row, x, strict=True)), Fraction(0))
+            if abs(noise) > Fraction(r):
+                words = f"step {message.step}: {output} is off by {abs(float(noise)):.6g}, r = {r:.6g}"
+                self.broken.setdefault(message.name, words)
+                return f"sensor {message.name}"
+        return ""
+
+
+def _spans_steps(message: Posterior, archive: Archive) -> bool:
+    """Whether a set used sources of more than one step."""
+    found = []
+    for reference in message.used:
+        if reference[0] in ("posterior", "fused"):
+            try:
+                found.append(archive.find(reference, Message).step)
+            except Unverifiable:
+                continue
+    return len(set(found)) > 1

@@ -1,0 +1,53 @@
+"""What was brought to a set since its base, by steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction
+from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit
+
+
+@dataclass
+class Brought:
+    """The messages of one step, in the order applied: transfers or sources, measurements, then the input."""
+
+    transfers: list[Prediction | Fused] = field(default_factory=list)
+    measurements: list[Measurement] = field(default_factory=list)
+    sources: list[Posterior] = field(default_factory=list)
+    input: Input | None = None
+
+
+def course(posterior: Posterior, first: int, archive: Archive) -> dict[int, Brought]:
+    """The steps ``first`` … ``posterior.step`` with what each was given.
+
+    Raises :class:`Unverifiable` where a message is not in the archive, :class:`DoesNotFit` where one cannot have been
+    used at these steps.
+    """
+    if first > posterior.step:
+        raise DoesNotFit("base", f"a set of step {first}", f"one of step {posterior.step} or before")
+    steps = {k: Brought() for k in range(first, posterior.step + 1)}
+    messages = [archive.find(reference, Message) for reference in posterior.used]
+    for i, message in enumerate(messages):
+        k = message.step
+        if isinstance(message, Fused) and not isinstance(posterior, Fused):  # carried forward to a later step
+            later = (other.step for other in messages[i + 1 :] if not isinstance(other, Fused))
+            k = next(later, posterior.step)
+        if k not in steps or (isinstance(message, Input) and k == posterior.step):
+            span = f"steps {first} to {posterior.step}"
+            raise DoesNotFit("used", f"{message.topic} of {message.src} of step {message.step}", f"one of {span}")
+        _add(steps[k], message, posterior)
+    return steps
+
+
+def _add(brought: Brought, message: Message, posterior: Posterior) -> None:
+    if isinstance(message, Input):
+        brought.input = message
+    elif isinstance(message, Measurement):
+        brought.measurements.append(message)
+    elif isinstance(message, Posterior) and isinstance(posterior, Fused):
+        brought.sources.append(message)
+    elif isinstance(message, Prediction | Fused):
+        brought.transfers.append(message)
+    else:
+        raise DoesNotFit("used", f"a {message.topic} of {message.src}", "measurements, inputs and sets of others")

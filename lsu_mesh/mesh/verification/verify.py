@@ -1,0 +1,126 @@
+"""Every published set of a recording, recomputed and compared bit by bit; and whether it holds the true state."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import msgspec
+
+from lsu_mesh.errors import LsuMeshError
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.messages import Fused, Message, Posterior, Prediction
+from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
+from lsu_mesh.mesh.verification.containment import Containment
+from lsu_mesh.mesh.verification.recompute import FilterRecomputation, FusionRecomputation, Recomputation
+
+
+class Difference(NamedTuple):
+    """A recorded set that is not what its provenance gives; ``field`` names the first number that differs."""
+
+    peer: str
+    topic: str
+    step: int
+    seq: int
+    field: str
+    recorded: Any
+    recomputed: Any
+
+    def __str__(self) -> str:
+        place = f"{self.peer}, step {self.step}, {self.field} of {self.topic} {self.seq}"
+        return f"{place}: {self.recorded!r} in the recording, {self.recomputed!r} recomputed"
+
+
+class Missing(NamedTuple):
+    """A recorded set that cannot be recomputed, and why."""
+
+    peer: str
+    topic: str
+    step: int
+    seq: int
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.peer}, step {self.step}, {self.topic} {self.seq}: {self.reason}"
+
+
+@dataclass
+class Verification:
+    """What came of it. ``exact`` counts equal sets by (peer, topic), ``differences`` are in the order of arrival."""
+
+    exact: Counter[tuple[str, str]] = field(default_factory=Counter)
+    differences: list[Difference] = field(default_factory=list)
+    unverifiable: list[Missing] = field(default_factory=list)
+    containment: Containment = field(default_factory=Containment)
+
+    @property
+    def holds(self) -> bool:
+        """Whether all sets that can be recomputed are equal, and no set that must hold the truth misses it."""
+        return not self.differences and not self.containment.misses
+
+
+def verify(configuration: Configuration, messages: Iterable[Message]) -> Verification:
+    """Recompute the sets among ``messages`` (in the order of arrival), compare them, and look for the truth in them.
+
+    ``configuration`` is that of the recorded run.
+    """
+    archive = Archive(messages)
+    recomputations: dict[str, Recomputation] = {}
+    found = Verification(containment=Containment.of(configuration, archive))
+    for recorded in archive.sets():
+        found.containment.look(recorded)
+        recomputation = recomputations.get(recorded.src)
+        if recomputation is None:
+            recomputation = recomputations[recorded.src] = _recomputation(configuration, archive, recorded)
+        _check(found, recomputation, recorded)
+    return found
+
+
+def _recomputation(configuration: Configuration, archive: Archive, recorded: Message) -> Recomputation:
+    if isinstance(recorded, Fused):
+        return FusionRecomputation(configuration, archive, recorded.name)
+    return FilterRecomputation(configuration, archive, recorded.name)
+
+
+def _check(found: Verification, recomputation: Recomputation, recorded: Posterior | Prediction) -> None:
+    place = (recorded.src, recorded.topic, recorded.step, recorded.seq)
+    try:
+        if isinstance(recorded, Prediction):
+            fields = recomputation.prediction(recorded)
+        else:
+            fields = recomputation.posterior(recorded)
+    except Unverifiable as reason:
+        found.unverifiable.append(Missing(*place, str(reason)))
+        return
+    except DoesNotFit as wrong:
+        found.differences.append(Difference(*place, wrong.field, wrong.recorded, wrong.expected))
+        return
+    except LsuMeshError as error:
+        found.differences.append(Difference(*place, "base", "a set of the model", str(error)))
+        return
+    different = next(differences(recorded, fields), None)
+    if different is None:
+        found.exact[recorded.src, recorded.topic] += 1
+    else:
+        found.differences.append(Difference(*place, *different))
+
+
+def differences(recorded: Message, fields: Any) -> Iterator[tuple[str, Any, Any]]:
+    """``(place, recorded, recomputed)`` of every number of ``fields`` that differs, even in the sign of a zero."""
+    for name, value in sorted(fields.items(), key=lambda item: item[0] == "support"):
+        yield from _compare(name, msgspec.to_builtins(getattr(recorded, name)), msgspec.to_builtins(value))
+
+
+def _compare(place: str, old: Any, new: Any) -> Iterator[tuple[str, Any, Any]]:
+    if msgspec.msgpack.encode(old) == msgspec.msgpack.encode(new):
+        return
+    if isinstance(old, dict) and isinstance(new, dict) and old.keys() == new.keys():
+        for key in old:
+            yield from _compare(f"{place}.{key}", old[key], new[key])
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        for i, pair in enumerate(zip(old, new, strict=True)):
+            yield from _compare(f"{place}[{i}]", *pair)
+    else:
+        yield place, old, new
