@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -9,6 +10,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import msgpack
+import numpy as np
 import psutil
 import pytest
 
@@ -83,16 +86,24 @@ def test_the_others_go_on_when_a_filter_is_killed_and_the_run_says_so(start_run)
 
 
 def test_a_subscriber_of_ten_lines_sees_fused_bounds_that_hold_the_truth(start_run, root: Path) -> None:  # type: ignore[no-untyped-def]
-    session = start_run("--steps", "250", "--no-record")
-    until_steps_flow(session)
+    from services.recording.read import read_raw
+
+    session = start_run("--steps", "250", "--record", "heard.rrd")
     command = [sys.executable, str(root / "examples" / "subscribe.py"), session.endpoint]
     subscriber = subprocess.Popen(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert session.wait() == 0, session.output[1]
     subscriber.send_signal(signal.SIGINT)
-    lines = subscriber.communicate(timeout=20)[0].splitlines()
-    assert len(lines) > 50
-    assert "step" in lines[-1]
-    assert session.of("estimator")[-1]["inside"] == 1.0
+    lines, complaints = subscriber.communicate(timeout=20)
+    assert complaints == ""
+    raw = ((key, msgpack.unpackb(payload)) for key, _, payload in read_raw(session.folder / "heard.rrd"))
+    truth = {message["step"]: message["x"] for key, message in raw if "/truth/" in key}
+    assert len(lines.splitlines()) >= 250, "it waited for the mesh and missed nothing"
+    for line in lines.splitlines():
+        step, *intervals = re.findall(r"(?<=step) +\d+|-?\d+\.\d+", line)
+        bounds = np.array(intervals, dtype=float).reshape(-1, 2)
+        x, rounding = np.array(truth[int(step)]), 5e-5  # four decimals are printed
+        assert (bounds[:, 0] - rounding <= x).all(), line
+        assert (x <= bounds[:, 1] + rounding).all(), line
 
 
 def test_garbage_and_foreign_messages_are_refused_and_nobody_dies(start_run) -> None:  # type: ignore[no-untyped-def]
