@@ -19,6 +19,8 @@ NOTHING = "–"
 """A cell of a column of numbers that holds none."""
 SPREAD = " (mean ± sd)"
 """End of the title of a column with spreads."""
+ROUNDING = 1e-12
+"""Share of the largest value below which a deviation is one of rounding."""
 
 
 class Spread(NamedTuple):
@@ -29,9 +31,10 @@ class Spread(NamedTuple):
 
     @classmethod
     def of(cls, values: ArrayLike) -> Spread:
-        """Mean and standard deviation (n − 1) of one number per run; 0 for a single run."""
+        """Mean and standard deviation (n − 1) of one number per run; 0 for a single run, and for mere rounding."""
         runs = np.asarray(values, dtype=np.float64).ravel()
-        return cls(float(runs.mean()), float(runs.std(ddof=1)) if runs.size > 1 else 0.0)
+        sd = float(runs.std(ddof=1)) if runs.size > 1 else 0.0
+        return cls(float(runs.mean()), sd if sd > ROUNDING * float(np.abs(runs).max()) else 0.0)
 
     def printed(self, form: str) -> str:
         """``mean ± sd``, the standard deviation with two digits."""

@@ -5,14 +5,17 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TypeAlias, TypeVar
 
 Watch: TypeAlias = Callable[[float], None]
 """Is told the share of the work that is done, from 0 to 1."""
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+_SHARED: ContextVar[ProcessPoolExecutor | None] = ContextVar("shared", default=None)
 
 
 def unwatched(share: float) -> None:
@@ -40,17 +43,42 @@ def spread(
     workers = min(len(items), processes or cores())
     if workers <= 1:
         return [_watched(function, item, watch, (i + 1) / len(items)) for i, item in enumerate(items)]
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent) as pool:
-        waiting = [pool.submit(function, item) for item in items]
+    shared = _SHARED.get()
+    if shared is not None and processes is None:
+        return _submit(shared, function, items, watch)
+    with _pool(workers) as pool:
+        return _submit(pool, function, items, watch)
+
+
+@contextmanager
+def shared_processes() -> Iterator[None]:
+    """Every :func:`spread` in this context uses the same processes, which then start, and import, only once."""
+    with _pool(cores()) as pool:
+        token = _SHARED.set(pool)
         try:
-            for done, finished in enumerate(as_completed(waiting), 1):
-                finished.result()
-                watch(done / len(items))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-        return [finished.result() for finished in waiting]
+            yield
+        finally:
+            _SHARED.reset(token)
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent)
+
+
+def _submit(
+    pool: ProcessPoolExecutor, function: Callable[[Item], Result], items: Sequence[Item], watch: Watch
+) -> list[Result]:
+    waiting = [pool.submit(function, item) for item in items]
+    try:
+        for done, finished in enumerate(as_completed(waiting), 1):
+            finished.result()
+            watch(done / len(items))
+    except BaseException:
+        for job in waiting:
+            job.cancel()
+        raise
+    return [finished.result() for finished in waiting]
 
 
 def _watched(function: Callable[[Item], Result], item: Item, watch: Watch, share: float) -> Result:

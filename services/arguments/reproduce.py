@@ -16,6 +16,7 @@ class Experiment(NamedTuple):
 
 
 REPRODUCIBLE = {
+    "l2019": Experiment("LSUO and LSUP on S1, S2, S3 over a grid of noises: 16 criteria, 26 figures", ("l2019",)),
     "fusion": Experiment(
         "three filters and their fusion on P3; Bayesian transfer against the source's noise", ("fusion", "transfer")
     ),

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
 import json
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.experiments.outcome import Outcome, Table
 from lsu_mesh.experiments.page import page
-from lsu_mesh.experiments.workers import Watch, part
+from lsu_mesh.experiments.workers import Watch, part, shared_processes
 from services.arguments.reproduce import ALL, REPRODUCIBLE, WITH_BENCHMARKS
 from services.cli import COULD_NOT_START, NOT_MET, OK, USAGE
 from services.progress import ShareDone
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 PAGE = "papers"
 """Stem of the page of ``all``, and the folder of its files."""
 DOTS_PER_INCH = 90
+COLOURS = 160
 
 
 def main(options: argparse.Namespace) -> int:
@@ -40,16 +46,17 @@ def main(options: argparse.Namespace) -> int:
         print(f"{files}: cannot be made: {error.strerror}", file=sys.stderr)
         return USAGE
     outcomes = {}
-    for what in _chosen(options):
-        try:
-            outcomes[what] = _run(what, options)
-        except LsuMeshError as error:
-            print(f"{what}: {error}", file=sys.stderr)
-            return COULD_NOT_START
-        for outcome in outcomes[what]:
-            _print_json(outcome) if options.json else _print_tables(outcome)
-            for path in () if files is None else _write(outcome, files):
-                print(f"wrote {path}", file=sys.stderr)
+    with shared_processes():
+        for what in _chosen(options):
+            try:
+                outcomes[what] = _run(what, options)
+            except LsuMeshError as error:
+                print(f"{what}: {error}", file=sys.stderr)
+                return COULD_NOT_START
+            for outcome in outcomes[what]:
+                _print_json(outcome) if options.json else _print_tables(outcome)
+                for path in () if files is None else _write(outcome, files):
+                    print(f"wrote {path}", file=sys.stderr)
     if folder is not None and options.what == ALL:
         _write_page({what: _joined(parts) for what, parts in outcomes.items()}, folder, options)
     are_met = all(check.is_met for parts in outcomes.values() for outcome in parts for check in outcome.checks)
@@ -167,5 +174,15 @@ def _write(outcome: Outcome, folder: Path) -> Iterator[Path]:
             yield path
     for name, draw in outcome.figures.items():
         path = folder / f"{name}.png"
-        draw().savefig(path, dpi=DOTS_PER_INCH)
+        _save(draw(), path)
         yield path
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """As a PNG file with a palette, a third of the size."""
+    from PIL import Image
+
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=DOTS_PER_INCH)
+    with Image.open(drawn) as image:
+        image.convert("RGB").quantize(COLOURS).save(path, optimize=True)
