@@ -23,8 +23,13 @@ Rows = Annotated[list[Numbers], Meta(max_length=4096)]
 Text = Annotated[str, Meta(max_length=4096)]
 Reference = tuple[Text, Text, Text, Count]
 """``[topic, src, boot, seq]`` of a message that was used."""
+Mark = tuple[Text, Text, Count]
+"""``[src, boot, epoch]``: an epoch that a set descends from."""
 Guarantee = Literal["declared", "learned", "none"]
 """Whether a set holds the state under the declared bounds, under bounds that explain the data, or not surely at all."""
+
+Descent = Annotated[list[Mark], Meta(max_length=4096)]
+"""Epochs of others whose sets went into a set, directly or through others."""
 
 _BOOT = re.compile(r"[0-9a-f]{16}")
 
@@ -197,6 +202,7 @@ class Prediction(Message, frozen=True, kw_only=True):
     y_point: Numbers
     epoch: Count
     guarantee: Guarantee
+    descent: Descent = []
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -221,11 +227,12 @@ class Posterior(Message, frozen=True, kw_only=True):
     revision: Count
     epoch: Count
     guarantee: Guarantee
-    base: Reference | Literal["prior", "domain", "sources"]
+    base: Reference | Literal["prior", "reach", "domain", "sources"]
     used: Annotated[list[Reference], Meta(max_length=4096)]
     bounds: Bounds
     missing: Annotated[list[Text], Meta(max_length=4096)]
     cause: Text | None = None
+    descent: Descent = []
     gain: float | None = None
     """Gain of the step's Bayesian transfers in nats; nil where none was used, or where the set became flat."""
 

@@ -172,11 +172,27 @@ def test_after_contradictions_in_a_row_the_filter_resets_into_a_new_epoch(mesh_o
     assert newest[13].epoch == 1
 
 
-def test_without_a_domain_or_a_fused_set_a_reset_is_impossible_and_said(mesh_of: MakeMesh) -> None:
-    fault = 'sensors.s2.faults=[{kind="bias", from=10, to=40, size=5.0}]'
+def test_without_a_domain_a_reset_starts_from_the_prior_carried_through_all_inputs(mesh_of: MakeMesh) -> None:
+    fault = 'sensors.s2.faults=[{kind="bias", from=10, to=20, size=5.0}]'
     mesh = finished(mesh_of(f"mesh.steps={STEPS}", fault, "filters.box.reset_after=3"))
+    first, *_ = [e for e in mesh.events("reset") if e.name == "box"]
+    assert "the prior carried through all inputs" in first.text
+    newest = mesh.newest("box")
+    assert newest[12].base == "reach"
+    assert newest[12].status == "inconsistent"
+    assert newest[STEPS].status == "ok"
+    assert newest[STEPS].epoch == len([e for e in mesh.events("reset") if e.name == "box"])
+
+
+def test_with_nothing_sound_to_start_again_from_a_reset_is_impossible_and_said(mesh_of: MakeMesh) -> None:
+    fault = 'sensors.s2.faults=[{kind="bias", from=75, to=90, size=5.0}]'
+    mesh = mesh_of("mesh.steps=100", fault, "filters.box.reset_after=3")
+    mesh.run(0.8)
+    mesh.kill("box")
+    mesh.start("filter", "box")
+    mesh.run(1.6)
     assert any(e.name == "box" for e in mesh.events("reset-impossible"))
-    assert len(mesh.newest("box")) == STEPS
+    assert max(mesh.newest("box")) == 100
 
 
 def test_the_first_value_of_a_sensor_and_step_counts(mesh_of: MakeMesh) -> None:

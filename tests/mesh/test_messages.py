@@ -29,7 +29,7 @@ POSTERIOR: dict[str, Any] = COMMON | {
     "kind": "LSUO", "support": BOX, "lower": [0.0, -1.0], "upper": [1.0, 1.0], "point": [0.5, 0.0], "log_volume": None,
     "volume_of": "support", "status": "ok", "revision": 0, "epoch": 0, "guarantee": "declared", "base": "prior",
     "used": [["measurement", "sensor/s", "0123456789abcdef", 7]], "bounds": {"rho": [0.1, 0.1], "r": [0.2]},
-    "missing": [], "cause": None, "gain": None,
+    "missing": [], "cause": None, "descent": [], "gain": None,
 }  # fmt: skip
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -80,7 +80,7 @@ def test_a_malformed_posterior_is_refused_with_the_reason(change: dict[str, Any]
     assert caught.value.reason == reason
 
 
-@pytest.mark.parametrize("missing", sorted(set(POSTERIOR) - {"cause", "gain"}))
+@pytest.mark.parametrize("missing", sorted(set(POSTERIOR) - {"cause", "descent", "gain"}))
 def test_every_field_of_a_posterior_is_needed(missing: str) -> None:
     content = {name: value for name, value in POSTERIOR.items() if name != missing}
     with pytest.raises(Refused, match=missing):

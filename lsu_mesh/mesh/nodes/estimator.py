@@ -14,6 +14,7 @@ from typing import Literal
 
 import numpy as np
 
+from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import (
@@ -27,12 +28,15 @@ from lsu_mesh.mesh.messages import (
     Reference,
     SupportMessage,
 )
+from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.nodes.node import SECOND, Node
+from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
 
-Base = Reference | Literal["prior", "domain", "sources"]
+Base = Reference | Literal["prior", "reach", "domain", "sources"]
+About = dict[str, str | int | float | None]
 Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 START_GRACE = SECOND // 2
 """How long a late joiner listens to the past before it chooses where to start."""
@@ -40,6 +44,10 @@ REHEARSED_STEPS = 6
 """So many steps bring a limited complexity into play."""
 BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
+INPUT_LOST = 256
+"""An input that has not come when so many later steps' inputs have is not coming any more: a plant repeats no more."""
+MOST_STEPS = 4096
+"""Steps that are remembered while something is waited for."""
 MOST_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
 
@@ -55,6 +63,8 @@ class Step:
     """When the first message of the step came."""
     before: object | None = None
     """The set before the step's data, for rewinding."""
+    reach: object | None = None
+    """The prior carried to the step."""
     base: Base = "prior"
     used_before: tuple[Reference, ...] = ()
     """Base of ``before`` and what was used since."""
@@ -78,6 +88,9 @@ class Combined:
     gain: float | None = None
 
 
+WEAKNESS: tuple[Guarantee, ...] = ("declared", "learned", "none")
+
+
 class Estimator(Node):
     """A node that holds one set per step."""
 
@@ -87,7 +100,7 @@ class Estimator(Node):
         super().__init__(configuration, name, boot)
         self.engine = engine
         self.sources = sources
-        self.epoch = 0
+        self.epochs = Epochs(f"{self.role}/{name}", boot)
         self.current: int | None = None
         self._combined = False
         """Whether the data of the current step are in the set."""
@@ -109,12 +122,12 @@ class Estimator(Node):
         }  # fmt: skip
         self.guarantee: Guarantee = "declared"
         """The weakest guarantee among all that the set descends from."""
-        self._relied: dict[str, int] = {}
-        """Epoch of each source whose sets went into the set that is held now."""
-        self._epochs: dict[str, int] = {}
-        """Newest known epoch of each source."""
-        self.abandoned: str | None = None
-        """A source that was relied on and has abandoned its epoch since."""
+        self._remarks: list[Message] = []
+        """Events of a time update."""
+        self.unsound = ""
+        """Why the set that is held must not be believed; empty where it may."""
+        self.reach = Reach(engine.model)
+        """The prior carried through every input: from here one can always start again."""
         self.last_posterior: Posterior | None = None
         self.absent: set[str] = set()
         """Sources that are known to be gone and are not waited for."""
@@ -172,7 +185,7 @@ class Estimator(Node):
         if step.input is None:
             step.input = message
         elif step.input.u != message.u:
-            about: dict[str, str | int | float | None] = {"source": message.src, "step": message.step}
+            about: About = {"source": message.src, "step": message.step}
             text = f"input of step {message.step} came again from {message.src} with another value; the first counts"
             return [self.event("WARN", "input-changed", text, now, message.step, about)]
         return []
@@ -180,33 +193,18 @@ class Estimator(Node):
     def take_candidate(self, message: Posterior) -> None:
         """Note a sound set of the mesh from which a late joiner may start."""
         if message.src == f"{self.role}/{self.name}":
-            self.epoch = max(self.epoch, message.epoch)
+            self.epochs.continue_from(message.epoch)
         if message.status in ("ok", "predicted") and (self._candidate is None or message.step > self._candidate.step):
             self._candidate = message
 
-    def watch_epoch(self, message: Posterior | Prediction) -> bool:
-        """Whether the message's epoch is the newest of its source; notes when one that was relied on is abandoned."""
-        if message.epoch < self.epoch_of(message.src):
-            return False
-        self._epochs[message.src] = message.epoch
-        if message.epoch > self._relied.get(message.src, message.epoch):
-            self.abandoned = message.src
-        return True
-
-    def epoch_of(self, source: str) -> int:
-        """The newest known epoch of a source."""
-        return self._epochs.get(source, 0)
-
     def rely(self, message: Posterior | Prediction) -> None:
-        """Note that a message's set went into the own one, with its epoch and its guarantee."""
-        self._relied[message.src] = max(message.epoch, self._relied.get(message.src, 0))
+        """Note that a message's set went into the own one, with its epochs and its guarantee."""
+        self.epochs.rely(message)
         self.weaken(message.guarantee)
 
     def weaken(self, guarantee: Guarantee) -> None:
         """The set is from now on no better than this."""
-        order = ("declared", "learned", "none")
-        if order.index(guarantee) > order.index(self.guarantee):
-            self.guarantee = guarantee
+        self.guarantee = max(self.guarantee, guarantee, key=WEAKNESS.index)
 
     def inputs(self) -> dict[int, Input]:
         """The inputs that are remembered, by step."""
@@ -224,6 +222,8 @@ class Estimator(Node):
         step = self._steps.setdefault(k, Step())
         if step.seen is None:
             step.seen = now
+        if len(self._steps) > MOST_STEPS and self.current is None:
+            del self._steps[min(self._steps)]
         return step
 
     def _is_over(self, k: int) -> bool:
@@ -233,12 +233,12 @@ class Estimator(Node):
     # -- the course of steps
 
     def advance(self, now: int) -> list[Message]:
-        messages: list[Message] = []
         if self._dirty is not None:
             self._rewind(self._dirty)
             self._dirty = None
         if self.current is None and not self._start(now):
-            return messages
+            return []
+        messages: list[Message] = []
         while True:
             assert self.current is not None
             k = self.current
@@ -248,10 +248,13 @@ class Estimator(Node):
                     break
                 messages += self._close(k, step, now)
             if not self._predict(k, step, now):
+                if self._input_is_lost(k):
+                    self._start_over(k, f"the input of step {k} is lost", now)
                 break
-            if step.published is not None and not self._is_behind():
+            messages += self._said()
+            if step.published is not None and not self.unsound and not self._is_behind():
                 messages += self.prediction(k + 1, now)
-        return messages
+        return messages + self._said()
 
     def _is_ready(self, k: int, step: Step, now: int) -> bool:
         if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
@@ -281,6 +284,7 @@ class Estimator(Node):
     def _close(self, k: int, step: Step, now: int) -> list[Message]:
         """Combine the step's data and publish the result if it is new."""
         step.before, step.base, step.used_before = self.engine.snapshot(), self._base, self._used
+        step.reach = self.reach.snapshot()
         combined, messages = self.combine(k, step, now)
         step.closed = True
         self._combined = True
@@ -289,8 +293,11 @@ class Estimator(Node):
             self._restarted = False
         self._used = (*self._used, *combined.used)
         is_first = step.published is None
-        # "domain" is no message that says its step: the first posterior since then is always published.
-        may_skip = combined.status in ("ok", "predicted") and len(self._used) < MOST_USED and self._base != "domain"
+        # a base that is no message does not say its step: the first posterior since then is always published
+        tells_step = self._base == "prior" or not isinstance(self._base, str)
+        may_skip = combined.status in ("ok", "predicted") and len(self._used) < MOST_USED and tells_step
+        if self.unsound and self.last_posterior is None:
+            return messages
         if is_first and self._is_behind() and may_skip:
             self._counts["behind"] += 1
             return messages
@@ -301,7 +308,8 @@ class Estimator(Node):
         """The posterior's message, or None when the step was published before with the same set."""
         support, old = to_message(self.engine.support), step.published
         box = tuple(bound.tolist() for bound in self.published_bounds())
-        if old is not None and (old.support, (old.lower, old.upper), old.status) == (support, box, combined.status):
+        said = None if old is None else (old.support, (old.lower, old.upper), old.status, old.epoch, old.guarantee)
+        if old is not None and said == (support, box, combined.status, self.epochs.number, self.guarantee):
             self._base, self._used = old.reference, ()
             return None
         step.revision += 1
@@ -324,13 +332,59 @@ class Estimator(Node):
                 self._waiting = f"input of step {k}" if self._newest > k else ""
                 return False
         self._waiting = ""
-        self.engine.predict(u)
         if step.input is not None:
             self._used = (*self._used, step.input.reference)
+        self.reach.predict(u)
+        if not self._predict_set(k, u, now):
+            return False
         self.current, self._combined = k + 1, False
         for old in [j for j in self._steps if j < k + 1 - self.history]:
             del self._steps[old]
         return True
+
+    def _predict_set(self, k: int, u: Vector | Orthotope | None, now: int) -> bool:
+        """Time update of the set; one that leaves the domain was wrong, one that outgrows all numbers says nothing."""
+        try:
+            self.engine.predict(u)
+        except (InconsistentData, UnboundedSupport) as error:
+            words = f"the prediction from step {k} failed: {error}"
+            start = self.start_without_data()
+            if start is None:
+                self._start_over(k, words, now)
+                return False
+            self.engine.reset(start[0])
+            self.begin_epoch(start[1])
+            about: About = {"step": k, "epoch": self.epochs.number}
+            self._remarks.append(self.event("ERROR", "reset", words, now, k, about))
+        return True
+
+    def start_without_data(self) -> tuple[Orthotope, Base] | None:
+        """What holds the state of the current step whatever was measured: the prior carried forward, or the domain."""
+        reach, domain = self.reach.box, self.engine.model.domain
+        if reach is not None:
+            return reach, "reach"
+        return None if domain is None else (domain, "domain")
+
+    def _said(self) -> list[Message]:
+        said, self._remarks = self._remarks, []
+        return said
+
+    def _input_is_lost(self, k: int) -> bool:
+        """Whether it makes no sense to wait for the input of step k any longer."""
+        if self.current is None:
+            return False
+        newest = max((j for j, step in self._steps.items() if step.input is not None), default=0)
+        return newest - k > INPUT_LOST or len(self._steps) > MOST_STEPS
+
+    def _start_over(self, k: int, why: str, now: int) -> None:
+        """Nothing is known behind step k: join again there, like a peer that starts late."""
+        for old in [j for j in self._steps if j <= k]:
+            del self._steps[old]
+        self.current, self._dirty, self._candidate, self._first_evidence = None, None, None, now
+        self.reach.lose()
+        self._counts["resets"] += 1
+        text = f"{why}; starting again behind it"
+        self._remarks.append(self.event("ERROR", "started-over", text, now, k, {"step": k}))
 
     def _rewind(self, k: int) -> None:
         """Return to the set before the data of step k, so that everything since is done again."""
@@ -339,6 +393,7 @@ class Estimator(Node):
             return
         self._counts["rewinds"] += 1
         self.engine.restore(step.before)
+        self.reach.restore(step.reach)
         self.current, self._combined = k, False
         self._base, self._used = step.base, step.used_before
 
@@ -363,7 +418,7 @@ class Estimator(Node):
 
     def _start_from_candidate(self) -> bool:
         candidate = self._candidate
-        if candidate is None or self._input_missing(candidate.step):
+        if candidate is None or self.epochs.is_abandoned(candidate) or self._input_missing(candidate.step):
             return False
         self.rely(candidate)
         self._begin(candidate.step, to_support(candidate.support), candidate.reference, restarted=True)
@@ -373,6 +428,7 @@ class Estimator(Node):
         if any(self._input_missing(j) for j in range(1, first)):
             return False
         self._begin(1, self.configuration.prior, "prior", restarted=False)
+        self.reach.begin(self.configuration.prior)
         return True
 
     def _input_missing(self, k: int) -> bool:
@@ -383,17 +439,30 @@ class Estimator(Node):
     def _begin(self, k: int, support: Support, base: Base, *, restarted: bool) -> None:
         self.engine.reset(support)
         self.current, self._combined, self._restarted = k, False, restarted
-        self._base, self._used, self._waiting = base, (), ""
+        self._base, self._used, self._waiting, self.unsound = base, (), "", ""
+        self.reach.lose()
         for old in [j for j in self._steps if j < k]:
             del self._steps[old]
 
     def begin_epoch(self, base: Base) -> None:
         """Note that the engine now holds a set made from ``base`` alone; what was before is never used again."""
-        self.epoch += 1
+        self.abandon_epoch("")
+        self.start_from(base)
+
+    def abandon_epoch(self, why: str) -> None:
+        """Tell all who relied on the own sets not to; ``why`` the engine holds nothing that may be believed now."""
+        self.epochs.begin()
         self._counts["resets"] += 1
-        self.guarantee, self.abandoned = "declared", None
-        self._relied.clear()
-        self._base, self._used, self._restarted = base, (), True
+        self.unsound = why
+        self._never_rewind()
+
+    def start_from(self, base: Base, used: Sequence[Reference] = ()) -> None:
+        """Note that the engine now holds a set made from ``base`` and ``used`` alone."""
+        self.guarantee, self.unsound = "declared", ""
+        self._base, self._used, self._restarted = base, tuple(used), True
+        self._never_rewind()
+
+    def _never_rewind(self) -> None:
         for step in self._steps.values():
             step.before = None
 
@@ -417,7 +486,7 @@ class Estimator(Node):
         return self._waiting
 
     def counters(self) -> dict[str, float]:
-        return self._counts | {"epoch": self.epoch, "newest": self._newest}
+        return self._counts | {"epoch": self.epochs.number, "newest": self._newest}
 
     def noise_bounds(self) -> Bounds:
         """rho and r in force."""

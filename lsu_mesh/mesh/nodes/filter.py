@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from lsu_mesh.errors import InconsistentData
+from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
@@ -24,15 +25,47 @@ from lsu_mesh.mesh.messages import (
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.contradiction import Dropped, update_without_contradicting_strips, widen
-from lsu_mesh.mesh.nodes.estimator import Base, Combined, Estimator, Status, Step, finite_or_none
+from lsu_mesh.mesh.nodes.estimator import About, Base, Combined, Estimator, Status, Step, finite_or_none
 from lsu_mesh.mesh.nodes.node import SECOND
-from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, Transfer
+from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, SOUND, Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
-from lsu_mesh.supports.support import Support, Vector
+from lsu_mesh.supports.support import Vector
 
-About = dict[str, str | int | float | None]
+
+@dataclass(frozen=True)
+class Brought:
+    """Transfers that were brought to a prediction, and their gain in nats."""
+
+    used: Sequence[Prediction | Fused] = ()
+    gain: float | None = None
+
+
+@dataclass(frozen=True)
+class Updated:
+    """What came of a data update, and the transfers that are still in the set."""
+
+    status: Status
+    brought: Brought = Brought()
+    cause: str | None = None
+    messages: Sequence[Message] = ()
+
+
+@dataclass(frozen=True)
+class Start:
+    """A sound set to start again from."""
+
+    set: object
+    """Snapshot of the engine that holds it."""
+    base: Base
+    words: str
+    used: Sequence[Reference] = ()
+    message: Fused | None = None
+
+    @property
+    def guarantee(self) -> str:
+        return "declared" if self.message is None else self.message.guarantee
 
 
 class FilterNode(Estimator):
@@ -55,7 +88,11 @@ class FilterNode(Estimator):
             start = self._rows[sensor].stop
         self._inconsistent: set[int] = set()
         """Steps in a row, up to the current one, whose data contradicted the set."""
-        self._fused: Fused | None = None
+        self._fused: dict[str, Fused] = {}
+        """Newest sound set of each fusion."""
+        self._is_tested = True
+        """Whether data of a later step have agreed with the set of the mesh that the node started from."""
+        self._started_at = 0
         self._transfer = Transfer(configuration, settings)
         self._widened: float | None = None
         """Factor by which r was widened in the current step."""
@@ -78,20 +115,20 @@ class FilterNode(Estimator):
         if isinstance(message, Input):
             return self.take_input(message, now)
         if isinstance(message, Prediction):
-            if self.watch_epoch(message):
-                self._transfer.note(message)
+            self.epochs.note(message)
+            self._transfer.note(message)
         elif isinstance(message, Posterior):
             self._receive_set(message)
         return []
 
     def _receive_set(self, message: Posterior) -> None:
-        if message.name != self.name and not self.watch_epoch(message):
-            return
+        self.epochs.note(message)
         if isinstance(message, Fused):
             if message.name in self.settings.transfer_from:
                 self._transfer.note(message)
-            if message.status in ("ok", "predicted"):
-                self._fused = message
+            known = self._fused.get(message.name)
+            if message.status in SOUND and (known is None or message.step >= known.step):
+                self._fused[message.name] = message
         if self.current is None:
             self.take_candidate(message)
 
@@ -111,16 +148,30 @@ class FilterNode(Estimator):
         self._widened = None
         y, used, origin = self._stack(step)
         missing = [name for name in self.sources if name not in step.arrived]
-        messages = [] if self.abandoned is None else self._leave_epoch(k, y, now)
-        transferred, gain, told = self._bring_transfers(k, step, now)
-        epoch = self.epoch
-        status, cause, complaints = self._update(k, y, now)
-        if self.epoch > epoch:  # reset: what was transferred went into the set that was given up
-            transferred, gain = [], None
-        if self.abandoned is not None:
-            status, cause = "inconsistent", f"descends from an epoch that {self.abandoned} has abandoned"
-        combined = Combined(status, [*transferred, *used], missing, origin, cause, gain)
-        return combined, [*messages, *told, *complaints]
+        messages = self._mend(k, y, now)
+        if self.unsound:
+            return Combined("inconsistent", [], missing, origin, self.unsound), messages
+        before = self.engine.snapshot()
+        brought, told = self._bring_transfers(k, step, now)
+        updated = self._update(k, y, before, brought, now)
+        for message in updated.brought.used:
+            self.rely(message)
+            if self._transfer.way == "data-predictor":
+                self.weaken("none")
+        transferred = [message.reference for message in updated.brought.used]
+        gain = updated.brought.gain
+        combined = Combined(updated.status, [*transferred, *used], missing, origin, updated.cause, gain)
+        return combined, [*messages, *told, *updated.messages]
+
+    def _contradicts(self, y: Vector) -> bool:
+        """Whether the data are proved to miss the set; it stays as it is."""
+        before = self.engine.snapshot()
+        try:
+            self.engine.update(y)
+        except InconsistentData:
+            return True
+        self.engine.restore(before)
+        return False
 
     def _stack(self, step: Step) -> tuple[Vector, list[Reference], int | None]:
         """Measured outputs by sensor name, then row, NaN where missing; what was used; the oldest sending time."""
@@ -137,53 +188,83 @@ class FilterNode(Estimator):
                 origins.append(message.origin_ns)
         return y, used, min(origins) if origins else None
 
-    def _bring_transfers(self, k: int, step: Step, now: int) -> tuple[list[Reference], float | None, list[Message]]:
-        """Condition the prediction on what others know: references, gain in nats, events."""
+    def _bring_transfers(self, k: int, step: Step, now: int) -> tuple[Brought, list[Message]]:
+        """Condition the prediction on what others know."""
         if self._transfer.way == "off":
-            return [], None, []
+            return Brought(), []
         inputs, is_replay = self.inputs(), step.transfers is not None
         if step.transfers is None:
-            step.transfers = self._transfer.available(k, inputs, needs_inputs=self.engine.model.input_count > 0)
+            has_inputs = self.engine.model.input_count > 0
+            step.transfers = self._transfer.available(k, inputs, self.epochs, needs_inputs=has_inputs)
             self._transfer.forget_before(k - OLDEST_BOX)
-        used: list[Reference] = []
+        used: list[Prediction | Fused] = []
         gain = 0.0
         messages: list[Message] = []
         for message in step.transfers:
+            if self.epochs.is_abandoned(message):
+                continue
             try:
                 gain += self.engine.condition(self._transfer.as_set(message, k, self.engine, inputs))
             except InconsistentData as error:
                 if not is_replay:
                     messages.append(self._transfer_event(k, message, error, now))
                 continue
-            used.append(message.reference)
-            self.rely(message)
-            if self._transfer.way == "data-predictor":
-                self.weaken("none")
-        return used, gain if used else None, messages
+            used.append(message)
+        return Brought(used, gain if used else None), messages
 
-    def _transfer_event(self, k: int, message: Message, error: InconsistentData, now: int) -> Message:
+    def _transfer_event(self, k: int, message: Message, why: object, now: int) -> Message:
         self._counts["transfers rejected"] += 1
-        text = f"step {k}: the transfer from {message.src} was left out: {error}"
+        text = f"step {k}: the transfer from {message.src} was left out: {why}"
         return self.event("WARN", "transfer-rejected", text, now, k, {"source": message.src, "step": k})
 
-    def _update(self, k: int, y: Vector, now: int) -> tuple[Status, str | None, list[Message]]:
-        """Data update; status, cause and events."""
+    def _update(self, k: int, y: Vector, before: object, brought: Brought, now: int) -> Updated:
+        """Data update; ``before`` is the set without the transfers, which give way where they alone contradict y."""
         if np.isnan(y).all():
-            return "predicted", None, []
+            return Updated("predicted", brought)
         try:
             self.engine.update(y)
-            self._inconsistent.clear()
         except InconsistentData as error:
-            self._counts["contradictions"] += 1
-            if self.settings.on_contradiction == "widen":
-                self._widened = widen(self.engine, y)
-                if self._widened is not None:
-                    self.weaken("learned")
-                    return "ok", f"{error}; r widened by {self._widened:.6g}", [self._widened_event(k, error, now)]
-            return "inconsistent", str(error), self._drop(k, y, now)
-        return "ok", None, []
+            return self._contradiction(k, y, before, brought, error, now)
+        self._agree(k)
+        return Updated("ok", brought)
+
+    def _agree(self, k: int) -> None:
+        self._inconsistent.clear()
+        self._is_tested = self._is_tested or k > self._started_at
 
     # -- contradictions
+
+    def _contradiction(
+        self, k: int, y: Vector, before: object, brought: Brought, error: InconsistentData, now: int
+    ) -> Updated:
+        """What is done when the data are proved to miss the set."""
+        if brought.used and self._agrees_without_transfers(y, before):
+            self._agree(k)
+            why = "it contradicts the data"
+            return Updated("ok", messages=[self._transfer_event(k, message, why, now) for message in brought.used])
+        self._counts["contradictions"] += 1
+        if not self._is_tested:
+            return Updated("inconsistent", cause=str(error), messages=self._refuse_start(k, y, error, now))
+        if self.settings.on_contradiction == "widen":
+            self._widened = widen(self.engine, y)
+            if self._widened is not None:
+                self.weaken("learned")
+                cause = f"{error}; r widened by {self._widened:.6g}"
+                return Updated("ok", brought, cause, [self._widened_event(k, error, now)])
+        epoch = self.epochs.number
+        messages = self._drop(k, y, now)
+        return Updated("inconsistent", brought if epoch == self.epochs.number else Brought(), str(error), messages)
+
+    def _agrees_without_transfers(self, y: Vector, before: object) -> bool:
+        """Update the set as it was before the transfers; False, and as it was after them, where y misses that too."""
+        after = self.engine.snapshot()
+        self.engine.restore(before)
+        try:
+            self.engine.update(y)
+        except InconsistentData:
+            self.engine.restore(after)
+            return False
+        return True
 
     def _widened_event(self, k: int, error: InconsistentData, now: int) -> Message:
         text = f"step {k}: {error}; r was widened by {self._widened:.4g} in this step, the set is no longer guaranteed"
@@ -218,54 +299,108 @@ class FilterNode(Estimator):
         """Too many contradictions in a row: start again from something sound, or say that there is nothing."""
         self._inconsistent.clear()
         count = self.settings.reset_after
-        words = self._restart(k, y)
-        if words:
+        start = self._start_again(k, y, abandons=True)
+        if start is not None:
+            self.abandon_epoch("")
+            self._hold(start)
             self.engine.update(y)
-            text = f"step {k}: {count} steps in a row contradicted the set; started again from {words}"
-            return self.event("ERROR", "reset", text, now, k, {"step": k, "epoch": self.epoch})
+            text = f"step {k}: {count} steps in a row contradicted the set; started again from {start.words}"
+            return self.event("ERROR", "reset", text, now, k, {"step": k, "epoch": self.epochs.number})
         text = (
             f"step {k}: {count} steps in a row contradicted the set and there is nothing sound to "
             "start again from; give the model a domain, or check the declared bounds"
         )
         return self.event("ERROR", "reset-impossible", text, now, k, {"step": k})
 
-    def _leave_epoch(self, k: int, y: Vector, now: int) -> list[Message]:
-        """A source that was relied on has abandoned its epoch: start again from something sound, or say so."""
-        source = str(self.abandoned)
-        self._transfer.forget_source(source.rpartition("/")[2])
-        words = self._restart(k, y)
-        if words:
-            text = f"step {k}: {source} has abandoned its epoch; started again from {words}"
-            return [self.event("WARN", "epoch-left", text, now, k, {"source": source, "step": k, "epoch": self.epoch})]
-        text = f"step {k}: {source} has abandoned its epoch and there is nothing sound to start again from"
-        return [self.event("ERROR", "epoch-lost", text, now, k, {"source": source, "step": k})]
+    def _refuse_start(self, k: int, y: Vector, error: InconsistentData, now: int) -> list[Message]:
+        """The set that the node started from misses the first data: it was not sound."""
+        self._is_tested = True
+        event = self._abandon(k, y, f"the set that it started from contradicts the data: {error}", {}, now)
+        if not self.unsound:
+            self.engine.update(y)
+        return [event]
 
-    def _restart(self, k: int, y: Vector) -> str:
-        """Hold, in a new epoch, the step's fused set or the domain, whichever meets the data; "" where neither does.
+    def _mend(self, k: int, y: Vector, now: int) -> list[Message]:
+        """Leave an epoch that a source has abandoned; where there was nothing sound to start from, look again."""
+        source = self.epochs.abandoned
+        if source is not None:
+            return [self._abandon(k, y, f"{source} has abandoned its epoch", {"source": source}, now)]
+        start = self._start_again(k, y, abandons=False) if self.unsound else None
+        if start is None:
+            return []
+        self._hold(start)
+        text = f"step {k}: started again from {start.words}"
+        return [self.event("INFO", "found-start", text, now, k, {"step": k, "epoch": self.epochs.number})]
 
-        The data themselves are not brought to it yet.
+    def _abandon(self, k: int, y: Vector, why: str, about: About, now: int) -> Message:
+        """A new epoch at once, so that others learn of it; held is something sound, or nothing that may be believed."""
+        start = self._start_again(k, y, abandons=True)
+        self.abandon_epoch(f"{why}; there is nothing sound to start again from")
+        about = about | {"step": k, "epoch": self.epochs.number}
+        if start is None:
+            return self.event("ERROR", "epoch-lost", f"step {k}: {self.unsound}", now, k, about)
+        self._hold(start)
+        text = f"step {k}: {why}; started again from {start.words}"
+        return self.event("WARN", "epoch-left", text, now, k, about)
+
+    def _hold(self, start: Start) -> None:
+        self.engine.restore(start.set)
+        self.start_from(start.base, start.used)
+        if start.message is not None:
+            self.rely(start.message)
+
+    def _start_again(self, k: int, y: Vector, *, abandons: bool) -> Start | None:
+        """A set of step k, before its data, that is sound and meets them; ``None`` where there is none.
+
+        In this order: a fused set carried forward, if it does not descend from the epoch that is left; the prior
+        carried through every input; the domain.
         """
-        fused, domain = self._fused, self.engine.model.domain
-        candidates: list[tuple[Support, Base, str]] = []
-        if fused is not None and fused.step == k and fused.epoch == self.epoch_of(fused.src):
-            candidates.append((to_support(fused.support), fused.reference, f"the fused set of step {k}"))
-        if domain is not None:
-            candidates.append((domain, "domain", "the domain"))
         before = self.engine.snapshot()
-        for support, base, words in candidates:
-            self.engine.reset(support)
-            start = self.engine.snapshot()
+        newest_first = sorted(self._fused.values(), key=lambda fused: -fused.step)
+        carried_on = (self._from_fused(fused, k, abandons) for fused in newest_first)
+        starts = [start for start in carried_on if start is not None]
+        for support, base, words in (
+            (self.reach.box, "reach", "the prior carried through all inputs"),
+            (self.engine.model.domain, "domain", "the domain"),
+        ):
+            if support is not None:
+                self.engine.reset(support)
+                starts.append(Start(self.engine.snapshot(), base, words))  # type: ignore[arg-type]
+        starts.sort(key=lambda start: start.guarantee != "declared")
+        met = None
+        for start in starts:
+            self.engine.restore(start.set)
+            if not self._contradicts(y):
+                met = start
+                break
+        self.engine.restore(before)
+        return met
+
+    def _from_fused(self, fused: Fused, k: int, abandons: bool) -> Start | None:
+        """A fused set of step k or before, carried to step k."""
+        if not k - OLDEST_BOX <= fused.step <= k or self.epochs.is_abandoned(fused):
+            return None
+        if abandons and self.epochs.is_descendant(fused):
+            return None
+        inputs, used = self.inputs(), []
+        self.engine.reset(to_support(fused.support))
+        for j in range(fused.step, k):
+            u = inputs.get(j)
+            if self.engine.model.input_count and u is None:
+                return None
             try:
-                self.engine.update(y)
-            except InconsistentData:
-                self.engine.restore(before)
-                continue
-            self.engine.restore(start)
-            self.begin_epoch(base)
-            if fused is not None and base == fused.reference:
-                self.rely(fused)
-            return words
-        return ""
+                self.engine.predict(None if u is None else np.array(u.u))
+            except (InconsistentData, UnboundedSupport):
+                return None
+            used += [] if u is None else [u.reference]
+        return Start(self.engine.snapshot(), fused.reference, f"the fused set of step {fused.step}", used, fused)
+
+    def _start_from_candidate(self) -> bool:
+        if not super()._start_from_candidate():
+            return False
+        assert self.current is not None
+        self._is_tested, self._started_at = False, self.current
+        return True
 
     # -- messages out
 
@@ -277,7 +412,8 @@ class FilterNode(Estimator):
             support=support,
             status=combined.status,
             revision=step.revision,
-            epoch=self.epoch,
+            epoch=self.epochs.number,
+            descent=self.epochs.descent,
             guarantee=self.guarantee,
             base=self._base,
             used=list(combined.used),
@@ -297,7 +433,8 @@ class FilterNode(Estimator):
                 **self.stamp("prediction", k, now),
                 **foretold(self.engine),
                 support=to_message(self.engine.support),
-                epoch=self.epoch,
+                epoch=self.epochs.number,
+                descent=self.epochs.descent,
                 guarantee=self.guarantee,
             )
         ]

@@ -16,14 +16,14 @@ from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Fused, Health, Input, Message, Posterior, Rejection, SupportMessage
-from lsu_mesh.mesh.nodes.estimator import Combined, Estimator, Status, Step, finite_or_none
+from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Combined, Estimator, Status, Step, finite_or_none
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.quarantine import Quarantine, Say
+from lsu_mesh.mesh.nodes.transfer import SOUND
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
 
-About = dict[str, str | int | float | None]
 MOST_FAMILIES = 64
 """So many families of contradicting sources are tried, the largest first, to find out whom to leave out."""
 SILENT_STEPS = 5
@@ -99,14 +99,15 @@ class FusionNode(Estimator):
 
     def _receive_posterior(self, message: Posterior, now: int) -> None:
         name = message.name
-        if not self.watch_epoch(message):
+        self.epochs.note(message)
+        known = self.last.get(name)
+        if known is not None and self.epochs.is_abandoned(known):
+            del self.last[name]
+            known = None
+        if self.epochs.is_abandoned(message):
             return
-        if message.status in ("ok", "predicted"):
-            known = self.last.get(name)
-            if known is None or message.step >= known.step:
-                self.last[name] = message
-            if self.current is None:
-                self.take_candidate(message)
+        if message.status in SOUND and (known is None or message.step >= known.step):
+            self.last[name] = message
         old = self.arrived(message.step, name)
         if old is None or old.boot != message.boot or old.seq < message.seq:
             self.take(name, message, now)
@@ -133,25 +134,33 @@ class FusionNode(Estimator):
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
         self._rejected = []
         sources = self._sound_sources(step)
+        abandoned = self._leave_abandoned_epoch(k, now)
         missing = [name for name in self.sources if name not in step.arrived]
         self._met = self.engine.bounds()
         if self.settings.policy == "relaxed" and len(sources) > self.settings.faults:
             outcome = self._relaxed(k, sources, now)
         elif self.settings.policy == "intersect" and sources:
             outcome = self._intersected(k, sources, now)
-        else:
+        elif not self.unsound or self._start_without_sources():
             outcome = Outcome("predicted", [])
+        else:
+            outcome = Outcome("inconsistent", [], self.unsound)
         self.engine.resume(self.engine.support, *self._met)  # what is published is all that the next step depends on
         agreeing = sources if outcome.status != "inconsistent" else []
-        messages = [*outcome.messages, *self._note_rejected(k, agreeing, now)]
-        for source in outcome.used:
-            if self.settings.policy == "intersect":
-                self.rely(source.message)
-            else:  # no single source carries a relaxed set: one that abandons its epoch was allowed to be wrong
-                self.weaken(source.message.guarantee)
+        messages = [*abandoned, *outcome.messages, *self._note_rejected(k, agreeing, now)]
+        self._rely_on(outcome.used)
         origin = min((source.message.origin_ns for source in outcome.used), default=None)
         used = [source.message.reference for source in outcome.used]
         return Combined(outcome.status, used, missing, origin, outcome.cause), messages
+
+    def _rely_on(self, used: Sequence[Source]) -> None:
+        """No single source carries a relaxed set: of those that are learned, or abandoned, ``faults`` may be wrong."""
+        if self.settings.policy == "intersect":
+            for source in used:
+                self.rely(source.message)
+        elif used:
+            guarantees = sorted((source.message.guarantee for source in used), key=WEAKNESS.index, reverse=True)
+            self.weaken(guarantees[min(self.settings.faults, len(guarantees) - 1)])
 
     def _sound_sources(self, step: Step) -> list[Source]:
         sources = []
@@ -159,9 +168,9 @@ class FusionNode(Estimator):
             message = step.arrived.get(name)
             if not isinstance(message, Posterior):
                 continue
-            if message.epoch < self.epoch_of(message.src):
-                self._rejected.append(Rejection(source=name, reason=f"epoch {message.epoch} was abandoned"))
-            elif message.status in ("ok", "predicted"):
+            if self.epochs.is_abandoned(message):
+                self._rejected.append(Rejection(source=name, reason="descends from an epoch that was abandoned"))
+            elif message.status in SOUND:
                 sources.append(Source(name, message, to_support(message.support)))
             else:
                 self._rejected.append(Rejection(source=name, reason=f"status {message.status}"))
@@ -170,16 +179,20 @@ class FusionNode(Estimator):
     def _intersected(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
         """Every source with the own prediction; without the prediction where only that is wrong."""
         before, met = self.engine.snapshot(), self._met
-        if self.abandoned is None and self._try_all(sources):
+        if not self.unsound and self._try_all(sources):
             return Outcome("ok", sources, None, self._name_rejected(k, [], now))
         self.engine.restore(before)
         if self._restart(sources):
             return self._without_prediction(k, sources, now)
         self.engine.restore(before)
         self._met = met
+        cause = "sources contradict one another"
+        if self.unsound and not self._start_without_sources():
+            return Outcome("inconsistent", [], f"{cause}, and {self.unsound}")
         accepted = self._largest_family(sources)
+        self.weaken("learned")
         messages = self._name_rejected(k, [source for source in sources if source not in accepted], now)
-        return Outcome("ok" if accepted else "inconsistent", accepted, "sources contradict one another", messages)
+        return Outcome("ok" if accepted else "inconsistent", accepted, cause, messages)
 
     def _relaxed(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
         """What holds the state as long as at most ``faults`` of the sources are wrong."""
@@ -191,7 +204,7 @@ class FusionNode(Estimator):
             event = self.event("ERROR", "too-many-faults", f"step {k}: {cause}", now, k, about)
             return Outcome("inconsistent", [], cause, [event])
         messages = self._name_rejected(k, [sources[i] for i in together.rejected], now)
-        if self.abandoned is None and self._meet(together.support, together.bounds):
+        if not self.unsound and self._meet(together.support, together.bounds):
             return Outcome("ok", sources, None, messages)
         self.engine.reset(together.support)
         self._met = together.bounds
@@ -199,14 +212,43 @@ class FusionNode(Estimator):
         return Outcome(outcome.status, outcome.used, outcome.cause, [*messages, *outcome.messages])
 
     def _without_prediction(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
-        """The engine holds what the sources say alone: a new epoch begins."""
-        if self.abandoned is None:
-            cause = "own prediction was disjoint from what the sources agree on"
-        else:
-            cause = f"{self.abandoned} has abandoned its epoch"
+        """The engine holds what the sources say alone: a new epoch begins, unless nothing was held before."""
+        cause = self.unsound or "own prediction was disjoint from what the sources agree on"
+        if self.unsound:
+            self.start_from("sources")
+            return Outcome("restarted", sources, cause)
         self.begin_epoch("sources")
         event = self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now, k, {"step": k})
         return Outcome("restarted", sources, cause, [event])
+
+    def _leave_abandoned_epoch(self, k: int, now: int) -> list[Message]:
+        """When a source abandons an epoch that went into the set, the fusion leaves its own at once, and says so."""
+        source = self.epochs.abandoned
+        if source is None:
+            return []
+        self.abandon_epoch(f"{source} has abandoned its epoch")
+        event = self.event("ERROR", "prediction-dropped", f"step {k}: {self.unsound}", now, k, {"step": k})
+        return [event]
+
+    def _start_without_sources(self) -> bool:
+        """Hold the prior carried through all inputs, or the domain; False where neither is known."""
+        start = self.start_without_data()
+        if start is None:
+            return False
+        self.engine.reset(start[0])
+        self._met = self.engine.bounds()
+        self.start_from(start[1])
+        return True
+
+    def _start_from_candidate(self) -> bool:
+        """A fusion that starts late takes what its sources say together of a step, once enough of them are there."""
+        enough = self.settings.faults + 1 if self.settings.policy == "relaxed" else 1
+        for k in sorted(self._steps, reverse=True):
+            if len(self._sound_sources(self._steps[k])) >= enough and not self._input_missing(k):
+                self._begin(k, self.configuration.prior, "prior", restarted=True)
+                self.unsound = "started late"
+                return True
+        return False
 
     def _try_all(self, sources: Sequence[Source]) -> bool:
         return all(self._try(source) for source in sources)
@@ -304,7 +346,8 @@ class FusionNode(Estimator):
             support=support,
             status=combined.status,
             revision=step.revision,
-            epoch=self.epoch,
+            epoch=self.epochs.number,
+            descent=self.epochs.descent,
             guarantee=self.guarantee,
             base=self._base,
             used=list(combined.used),

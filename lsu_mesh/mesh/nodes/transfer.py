@@ -23,7 +23,9 @@ from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.mesh.config.settings import Configuration, FilterSettings
 from lsu_mesh.mesh.messages import Fused, Input, Message, Prediction
+from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.sets import to_support
+from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
@@ -45,8 +47,11 @@ class Transfer:
         """Remember a prediction or a fused set."""
         if isinstance(message, Prediction) and self.way in ("predictor", "data-predictor"):
             self._predictions.setdefault(message.step, {})[message.name] = message
-        elif isinstance(message, Fused) and self.way == "fused" and message.status in SOUND:
-            self._fused.setdefault(message.step, {})[message.name] = message
+        elif isinstance(message, Fused) and self.way == "fused":
+            boxes = self._fused.setdefault(message.step, {})
+            known = boxes.get(message.name)
+            if known is None or known.boot != message.boot or known.seq < message.seq:
+                boxes[message.name] = message
 
     def forget_before(self, k: int) -> None:
         """Drop what belongs to steps before k."""
@@ -54,37 +59,28 @@ class Transfer:
             for old in [step for step in kept if step < k]:
                 del kept[old]
 
-    def forget_source(self, name: str) -> None:
-        """Drop everything that came from one source: its epoch was abandoned."""
-        for predictions in self._predictions.values():
-            predictions.pop(name, None)
-        for boxes in self._fused.values():
-            boxes.pop(name, None)
-
-    def available(self, k: int, inputs: Mapping[int, Input], *, needs_inputs: bool) -> Sequence[Prediction | Fused]:
-        """What can be brought to the prediction of step k, sources by name."""
+    def available(
+        self, k: int, inputs: Mapping[int, Input], epochs: Epochs, *, needs_inputs: bool
+    ) -> Sequence[Prediction | Fused]:
+        """What can be brought to the prediction of step k, sources by name; nothing of an abandoned epoch."""
         if self.way in ("predictor", "data-predictor"):
-            return [message for _, message in sorted(self._predictions.get(k, {}).items())]
+            predictions = sorted(self._predictions.get(k, {}).items())
+            return [message for _, message in predictions if not epochs.is_abandoned(message)]
         for j in range(k - 1, max(0, k - 1 - OLDEST_BOX), -1):
             if needs_inputs and j not in inputs:
                 return []
-            if self._fused.get(j):
-                return [message for _, message in sorted(self._fused[j].items())]
+            boxes = [message for _, message in sorted(self._fused.get(j, {}).items()) if message.status in SOUND]
+            if sound := [message for message in boxes if not epochs.is_abandoned(message)]:
+                return sound
         return []
 
     def as_set(self, message: Prediction | Fused, k: int, engine: Filter, inputs: Mapping[int, Input]) -> Support:
         """The set of step k that a message stands for; ``InconsistentData`` for an empty strip."""
         if isinstance(message, Fused):
-            return self._carried(message, k, engine, inputs)
+            return carried(message, k, engine.model, inputs)
         if self.way == "predictor":
             return to_support(message.support)
         return self._strip(message, engine)
-
-    def _carried(self, message: Fused, k: int, engine: Filter, inputs: Mapping[int, Input]) -> Support:
-        box = LSUO(engine.model, Orthotope(message.lower, message.upper))
-        for j in range(message.step, k):
-            box.predict(np.array(inputs[j].u) if engine.model.input_count else None)
-        return box.support
 
     def _strip(self, message: Prediction, engine: Filter) -> Support:
         """Strips of the outputs that source and target both have (equal rows of C), with the target's r."""
@@ -99,3 +95,11 @@ class Transfer:
         if np.isnan(middle).all():
             raise InconsistentData(f"the output predictor of {message.name} is wider than 2 r, or of other outputs")
         return engine.support.to_constrained_zonotope().meet_strips(target.C, middle, radius)
+
+
+def carried(message: Fused, k: int, model: LSUModel, inputs: Mapping[int, Input]) -> Orthotope:
+    """The fused box of a step, carried to step k by the model; ``InconsistentData`` where it leaves the domain."""
+    box = LSUO(model, Orthotope(message.lower, message.upper))
+    for j in range(message.step, k):
+        box.predict(np.array(inputs[j].u) if model.input_count else None)
+    return Orthotope(*box.bounds())

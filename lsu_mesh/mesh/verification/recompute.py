@@ -20,10 +20,12 @@ from lsu_mesh.mesh.nodes import fusion as fusion_node
 from lsu_mesh.mesh.nodes.contradiction import update_without_contradicting_strips, widen
 from lsu_mesh.mesh.nodes.estimator import finite_or_none
 from lsu_mesh.mesh.nodes.filter import described, foretold
+from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.nodes.transfer import Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.course import Brought, course
+from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Vector
 
 Fields = Mapping[str, Any]
@@ -86,6 +88,9 @@ class Recomputation(ABC):
                 raise DoesNotFit("base", "the domain", "something that the model has")
             self._engine.reset(domain)
             return recorded.step
+        if base == "reach":
+            self._engine.reset(self._reach(recorded.step))
+            return recorded.step
         if base == "sources":
             return recorded.step
         message = self._archive.find(base, Posterior)
@@ -94,6 +99,18 @@ class Recomputation(ABC):
         else:
             self._engine.reset(to_support(message.support))
         return message.step
+
+    def _reach(self, k: int) -> Orthotope:
+        """The prior carried to step k."""
+        if self._engine.model.input_count and self._configuration.input_box is not None:
+            raise Unverifiable(f"which inputs before step {k} were known in time is not told")
+        reach = Reach(self._engine.model)
+        reach.begin(self._configuration.prior)
+        for j in range(1, k):
+            reach.predict(self._input(j))
+        if reach.box is None:
+            raise DoesNotFit("base", "the prior carried forward", "something that is bounded")
+        return reach.box
 
     def _hold(self, own: Posterior) -> None:
         """Hold what the same process held when it published a posterior."""
