@@ -12,11 +12,14 @@ if TYPE_CHECKING:
     from lsu_mesh.errors import InconsistentData, LsuMeshError, ModelError, UnboundedSupport
     from lsu_mesh.filters.bank import FilterBank
     from lsu_mesh.filters.filter import Filter, OutputPrediction
+    from lsu_mesh.filters.kalman import Kalman
     from lsu_mesh.filters.lsucz import LSUCZ
     from lsu_mesh.filters.lsuo import LSUO
     from lsu_mesh.filters.lsup import LSUP
     from lsu_mesh.filters.lsupb import LSUPB
     from lsu_mesh.filters.run import FilterRun, run_filter
+    from lsu_mesh.filters.truncated_kalman import TruncatedKalman
+    from lsu_mesh.filters.window_map import WindowMAP
     from lsu_mesh.filters.zonotopic_kalman import ZonotopicKalman
     from lsu_mesh.fusion.fuse import Fusion, fuse
     from lsu_mesh.model import LSUModel
@@ -36,6 +39,7 @@ _HOMES = {
     "Fusion": "lsu_mesh.fusion.fuse",
     "InconsistentData": "lsu_mesh.errors",
     "Intersection": "lsu_mesh.supports.intersection",
+    "Kalman": "lsu_mesh.filters.kalman",
     "LSUCZ": "lsu_mesh.filters.lsucz",
     "LSUModel": "lsu_mesh.model",
     "LSUO": "lsu_mesh.filters.lsuo",
@@ -48,7 +52,9 @@ _HOMES = {
     "Parallelotope": "lsu_mesh.supports.parallelotope",
     "Simulation": "lsu_mesh.simulation",
     "Support": "lsu_mesh.supports.support",
+    "TruncatedKalman": "lsu_mesh.filters.truncated_kalman",
     "UnboundedSupport": "lsu_mesh.errors",
+    "WindowMAP": "lsu_mesh.filters.window_map",
     "Zonotope": "lsu_mesh.supports.zonotope",
     "ZonotopicKalman": "lsu_mesh.filters.zonotopic_kalman",
     "fuse": "lsu_mesh.fusion.fuse",
@@ -68,6 +74,7 @@ __all__ = [
     "Fusion",
     "InconsistentData",
     "Intersection",
+    "Kalman",
     "LSUModel",
     "LsuMeshError",
     "ModelError",
@@ -76,7 +83,9 @@ __all__ = [
     "Parallelotope",
     "Simulation",
     "Support",
+    "TruncatedKalman",
     "UnboundedSupport",
+    "WindowMAP",
     "Zonotope",
     "ZonotopicKalman",
     "fuse",

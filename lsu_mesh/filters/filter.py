@@ -31,6 +31,8 @@ class Filter(ABC):
     """
 
     kind: ClassVar[str]
+    guarantee: ClassVar[str] = "declared"
+    """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates."""
 
     @property
     @abstractmethod

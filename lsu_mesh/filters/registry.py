@@ -10,10 +10,13 @@ from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter
 
 FILTERS: dict[str, str] = {
+    "Kalman": "lsu_mesh.filters.kalman",
     "LSUCZ": "lsu_mesh.filters.lsucz",
     "LSUO": "lsu_mesh.filters.lsuo",
     "LSUP": "lsu_mesh.filters.lsup",
     "LSUPB": "lsu_mesh.filters.lsupb",
+    "TruncatedKalman": "lsu_mesh.filters.truncated_kalman",
+    "WindowMAP": "lsu_mesh.filters.window_map",
     "ZonotopicKalman": "lsu_mesh.filters.zonotopic_kalman",
 }
 """Kind of a filter (the name of its class) → module that holds it."""

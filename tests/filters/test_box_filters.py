@@ -44,7 +44,7 @@ def test_every_kind_is_registered_under_its_own_name() -> None:
 def test_an_unknown_kind_names_the_nearest() -> None:
     with pytest.raises(ModelError, match="did you mean 'LSUCZ'"):
         filter_class("LSU-CZ")
-    with pytest.raises(ModelError, match="valid: LSUCZ, LSUO"):
+    with pytest.raises(ModelError, match="valid: Kalman, LSUCZ, LSUO"):
         filter_class("qqqq")
 
 

@@ -1,0 +1,172 @@
+"""The Kalman filter, for comparison: Gaussian noise of the same variance as the uniform one."""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lsu_mesh.errors import InconsistentData, ModelError
+from lsu_mesh.filters.arguments import (
+    checked_prior,
+    half_width_vector,
+    input_interval,
+    kernel_model,
+    output_vector,
+    same_states,
+)
+from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.gain import hull_gain
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.support import Support
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+class Gaussian(NamedTuple):
+    """Mean (n,) and covariance (n, n); neither is ever written again."""
+
+    mean: Vector
+    covariance: Matrix
+
+
+def uniform_variance(half_widths: ArrayLike) -> Vector:
+    """Variance ``h²/3`` of a uniform distribution of half-width h."""
+    return np.asarray(half_widths, dtype=np.float64) ** 2 / 3.0
+
+
+class Kalman(Filter):
+    """``x̂ ← x̂ + K (y − C x̂)``, ``P ← (I − K C) P (I − K C)' + K R K'``; then ``A x̂ + B u``, ``A P A' + N Q N'``.
+
+    Parameters
+    ----------
+    model, prior:
+        LSU model with n states, ``Q = diag(rho²/3)``, ``R = diag(r²/3)``; a set, or a pair (lower, upper), whose box
+        gives mean and variance of x_1.
+    sigmas:
+        The published box is ``x̂ ± sigmas · √diag P``. It is *no* guaranteed bound.
+
+    Raises
+    ------
+    ModelError
+        Names the option or the prior that is wrong.
+
+    Source: Kalman 1960, in Joseph's form.
+    """
+
+    kind: ClassVar[str] = "Kalman"
+    guarantee: ClassVar[str] = "none"
+    _held: Gaussian
+
+    def __init__(
+        self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], sigmas: float = 3.0
+    ) -> None:  # fmt: skip
+        if not (np.isfinite(sigmas) and sigmas > 0):
+            raise ModelError(f"sigmas must be a number > 0, it is {sigmas}")
+        self._model = model
+        self._arrays = kernel_model(model)
+        self._sigmas = sigmas
+        self.reset(checked_prior(model, prior))
+
+    @property
+    def model(self) -> LSUModel:
+        """The model in force when no step says otherwise."""
+        return self._model
+
+    @property
+    def support(self) -> Orthotope:
+        """The box :meth:`bounds`."""
+        return Orthotope(*self.bounds())
+
+    @property
+    def point(self) -> Vector:
+        """Mean (n,)."""
+        return np.array(self._held.mean)
+
+    @property
+    def covariance(self) -> Matrix:
+        """P (n, n)."""
+        return np.array(self._held.covariance)
+
+    def bounds(self) -> tuple[Vector, Vector]:
+        """``x̂ ± sigmas · √diag P``, (n,), (n,); *not* guaranteed."""
+        mean, covariance = self._held
+        reach = self._sigmas * np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return mean - reach, mean + reach
+
+    def predict_output(self) -> OutputPrediction:
+        """``C x̂ ± sigmas · √diag(C P C' + R)``; *not* guaranteed."""
+        mean, covariance = self._held
+        C = self._arrays.C
+        variance = np.einsum("ij,jk,ik->i", C, covariance, C) + uniform_variance(self._arrays.r)
+        reach = self._sigmas * np.sqrt(np.maximum(variance, 0.0))
+        return OutputPrediction(C @ mean - reach, C @ mean + reach, C @ mean)
+
+    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Orthotope:
+        """Data update with y (m,), NaN where missing; it never contradicts."""
+        values = output_vector(y, self._model.output_count)
+        variances = uniform_variance(half_width_vector("r", r, self._arrays.r))
+        known = ~np.isnan(values)
+        if known.any():
+            self._held = corrected(self._held, self._arrays.C[known], values[known], variances[known])
+        return self.support
+
+    def predict(
+        self,
+        u: ArrayLike | Orthotope | None = None,
+        rho: ArrayLike | None = None,
+        model: LSUModel | None = None,
+    ) -> Orthotope:
+        """Time update; an interval of inputs counts as uniform noise."""
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else kernel_model(used)
+        center, half_widths = input_interval(u, used.input_count)
+        widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
+        mean, P = self._held
+        noise = (arrays.G * uniform_variance(widths)) @ arrays.G.T
+        self._held = Gaussian(arrays.A @ mean + arrays.B @ center, arrays.A @ P @ arrays.A.T + noise)
+        return self.support
+
+    def condition(self, support: Support) -> float:
+        """Take the box of ``support`` as a measurement of all states with uniform noise; the gain is of the boxes.
+
+        Raises ``InconsistentData`` where the boxes have no point in common.
+        """
+        lower, upper = checked_prior(self._model, support).bounds()
+        before = self.bounds()
+        if (np.maximum(lower, before[0]) > np.minimum(upper, before[1])).any():
+            raise InconsistentData(f"the box of {self.kind} and the transferred set have no point in common")
+        middle, reach = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        self._held = corrected(self._held, np.eye(len(middle)), middle, uniform_variance(reach))
+        return hull_gain(before, self.bounds())
+
+    def reset(self, support: Support) -> None:
+        """Start again with mean and variance of the uniform distribution on the box of ``support``."""
+        lower, upper = checked_prior(self._model, support).bounds()
+        self._held = Gaussian(0.5 * (lower + upper), np.diag(uniform_variance(0.5 * (upper - lower))))
+
+    def snapshot(self) -> object:
+        """Mean and covariance."""
+        return self._held
+
+    def restore(self, snapshot: object) -> None:
+        """Return to a state taken by :meth:`snapshot`, bit by bit."""
+        self._held = cast("Gaussian", snapshot)
+
+
+def corrected(held: Gaussian, C: Matrix, y: Vector, variances: Vector) -> Gaussian:
+    """Data update by outputs y (m,) with independent noise; one at a time, so that no matrix is inverted."""
+    mean, P = np.array(held.mean), np.array(held.covariance)
+    for row, value, variance in zip(C, y, variances, strict=True):
+        spread = P @ row
+        total = row @ spread + variance
+        if total <= 0.0:
+            continue
+        K = spread / total
+        mean = mean + K * (value - row @ mean)
+        left = np.eye(len(mean)) - np.outer(K, row)
+        P = left @ P @ left.T + variance * np.outer(K, K)
+    return Gaussian(mean, 0.5 * (P + P.T))
