@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from live_mesh import ROOT, LiveMesh
+from live_mesh import ROOT, SLACK_S, LiveMesh
 
 from lsu_mesh.mesh.keys import PREFIX
 
@@ -30,10 +30,12 @@ class Outcome:
     role: str
     detected: float | None
     by: str
-    recovered: float
-    """From the peer's return (its token, SIGCONT, the healed link) until all estimates are current and complete."""
     back: float
-    """From the repair until the peer is on the mesh: for a restart that is the start of the process."""
+    """From the repair (the start of the process, SIGCONT, the healed link) until the peer is on the mesh."""
+    resumed: float
+    """From then until every estimator has published an estimate of the present."""
+    recovered: float
+    """From then until every estimator has published one of the present from all of its sources."""
     lost: int
     estimates: int
     inside: int
@@ -43,13 +45,14 @@ class Outcome:
         """Of the table in Markdown."""
         seen = "nothing to detect" if self.detected is None else f"{self.detected:.2f} s ({self.by})"
         share = "100 %" if self.inside == self.estimates else f"{self.inside / self.estimates:.4%}"
-        cells = (self.fault, self.role, seen, f"{self.back:.2f} s", f"{self.recovered:.2f} s", str(self.lost))
+        times = [f"{time:.2f} s" for time in (self.back, self.resumed, self.recovered)]
+        cells = (self.fault, self.role, seen, *times, str(self.lost))
         return f"| {' | '.join(cells)} | {share} of {self.estimates} |"
 
 
 HEADER = """\
-| fault | role | detected in | back on the mesh | recovered in | lost samples | containment |
-|---|---|---|---|---|---|---|"""
+| fault | role | detected in | back on the mesh in | estimates in | recovered in | lost samples | containment |
+|---|---|---|---|---|---|---|---|"""
 
 
 def kill(mesh: LiveMesh, role: str, down: float = 1.0) -> Outcome:
@@ -151,10 +154,25 @@ def suffer(
     since = back if restarts else repaired
     mesh.until(lambda: mesh.is_current(since) and mesh.speaks(role, name, since), f"recovered from {fault} of {role}")
     recovered = mesh.clock.now()
+    resumed = max(_first_current(mesh, estimator, since) for estimator in mesh.estimators())
     lost = _lost(mesh, recovered)
     inside, count = mesh.containment(broken)
-    detected, by = _detected(mesh, role, name, broken, tells)
-    return Outcome(fault, role, detected, by, (recovered - since) * 1e-9, (back - repaired) * 1e-9, lost, count, inside)
+    detected, by = _detected(mesh, role, name, broken)
+    return Outcome(
+        fault, role, detected, by, (back - repaired) * 1e-9, (resumed - since) * 1e-9, (recovered - since) * 1e-9,
+        lost, count, inside,
+    )  # fmt: skip
+
+
+def _first_current(mesh: LiveMesh, estimator: str, since: int) -> int:
+    """When the first sound estimate of the present came after a moment."""
+    return next(
+        seen.arrival_ns
+        for seen in mesh.observer.estimates[estimator]
+        if seen.arrival_ns > since
+        and seen.message.status != "inconsistent"
+        and seen.message.step >= mesh.due(seen.arrival_ns) - mesh.steps(SLACK_S)
+    )
 
 
 def _await_return(mesh: LiveMesh, name: str, broken: int, repaired: int) -> int:
@@ -171,7 +189,7 @@ def _await_return(mesh: LiveMesh, name: str, broken: int, repaired: int) -> int:
     return repaired if seen is None else max(seen, repaired)
 
 
-def _detected(mesh: LiveMesh, role: str, name: str, broken: int, tells: bool) -> tuple[float | None, str]:
+def _detected(mesh: LiveMesh, role: str, name: str, broken: int) -> tuple[float | None, str]:
     """The first sign: the peer's token is gone, or an estimate lacks what the peer should have sent."""
     gone = [at for at, who, there in mesh.observer.tokens if who == name and not there and at > broken]
     signs = [(gone[0], "token")] if gone else []
@@ -222,7 +240,7 @@ def slow_subscriber(mesh: LiveMesh, seconds: float = 10.0) -> Outcome:
         process.send_signal(signal.SIGCONT)
         lost = _lost(mesh, since)
         inside, count = mesh.containment(began)
-        return Outcome(f"frozen {seconds:g} s", "subscriber", None, "", longest, 0.0, lost, count, inside)
+        return Outcome(f"SIGSTOP {seconds:g} s", "subscriber", None, "", 0.0, longest, longest, lost, count, inside)
     finally:
         process.kill()
         process.wait()

@@ -33,6 +33,8 @@ from services.supervisor import Child, Supervisor
 ROOT = Path(__file__).resolve().parent.parent
 SPEAKS = {"plant": "truth", "sensor": "measurement", "filter": "posterior", "fusion": "fused"}
 """What shows that a peer of a role works; a recorder tells it in its health."""
+SLACK_S = 0.4
+"""An estimate of a step that was due so long ago still counts as one of the present, in seconds."""
 READY_S = 120.0
 """A loaded machine compiles and loads slowly."""
 
@@ -74,11 +76,15 @@ class Observer:
             return
         self.newest[address] = (arrival_ns, message)
         if isinstance(message, Posterior):
-            self.estimates[message.name].append(Seen(arrival_ns, message))
+            self.note(Seen(arrival_ns, message))
         elif isinstance(message, Health):
             self.health[message.name].append((arrival_ns, message))
         elif isinstance(message, Event):
             self.events.append(message)
+
+    def note(self, seen: Seen) -> None:
+        """Keep an estimate."""
+        self.estimates[seen.message.name].append(seen)
 
 
 class LiveMesh:
@@ -92,8 +98,8 @@ class LiveMesh:
         As ``-X``.
     star:
         Each peer is a client of a router, over mutual TLS, through a proxy of its own. Else peers find one another.
-    topics:
-        What the observer subscribes to.
+    topics, observer:
+        What is subscribed to, and who notes it.
     """
 
     def __init__(
@@ -103,7 +109,7 @@ class LiveMesh:
         *,
         star: bool = False,
         topics: Sequence[str] = tuple(TYPES),
-        without: Sequence[str] = (),
+        observer: type[Observer] = Observer,
     ) -> None:
         self.star, self._topics, self._folder = star, topics, folder
         file = Path(shutil.copy(ROOT / "services" / "demo.toml", folder / "mesh.toml"))
@@ -118,9 +124,9 @@ class LiveMesh:
         environment = {"PYTHONPATH": str(ROOT), "CI": "true"}
         self.supervisor = Supervisor(settings, environment)
         self.clock = Clock()
-        self.observer = Observer(self.configuration)
+        self.observer = observer(self.configuration)
         self.start_ns = 0
-        self.peers = [(role, name) for role, name in self.configuration.peers() if name not in without]
+        self.peers = self.configuration.peers()
         self.proxies: dict[str, Proxy] = {}
         self._ending = threading.Event()
         self._reader = threading.Thread(target=self._observe, daemon=True)
@@ -253,7 +259,7 @@ class LiveMesh:
         """Filters and fusions."""
         return [name for role, name in self.peers if role in ("filter", "fusion")]
 
-    def is_current(self, since_ns: int, slack: float = 0.4) -> bool:
+    def is_current(self, since_ns: int, slack: float = SLACK_S) -> bool:
         """Whether everyone has published, since a moment, an estimate of the present from all of its sources."""
         return all(self._has_current(name, since_ns, slack) for name in self.estimators())
 
@@ -275,7 +281,7 @@ class LiveMesh:
         arrival_ns, message = self.observer.newest.get(key(mesh, topic, name), (0, None))
         if arrival_ns <= since_ns or message is None:
             return False
-        return topic == "health" or message.step >= self.due(arrival_ns) - self.steps(0.4)
+        return topic == "health" or message.step >= self.due(arrival_ns) - self.steps(SLACK_S)
 
     def gaps(self) -> dict[str, float]:
         """Messages that are known to be missing now, by peer, with the observer's own."""
@@ -283,26 +289,29 @@ class LiveMesh:
         dropped = {name: health[-1][1].counters.get("dropped", 0.0) for name, health in self.observer.health.items()}
         return {name: counted[name] + dropped[name] for name in counted} | {"observer": float(self.observer.gate.gaps)}
 
-    def truth(self, last: int) -> dict[int, Sequence[float]]:
-        """The true states, computed here: also of steps whose plant was dead."""
-        plant = self.configuration.plant
-        assert plant is not None
-        schedule = Schedule(0, self.configuration.mesh.rate)
-        node = PlantNode(self.configuration, plant.name, "0" * 16, schedule)
-        truth: dict[int, Sequence[float]] = {}
-        while len(truth) < last:
-            step = len(truth) + 1
-            due = schedule.time_of(step)
-            assert due is not None
-            truth |= {message.step: message.x for message in node.advance(due + 1000) if isinstance(message, Truth)}
-        return truth
-
     def containment(self, since_ns: int = 0) -> tuple[int, int]:
         """How many estimates hold the truth, and how many there are."""
         seen = [estimate.message for name in self.estimators() for estimate in self.observer.estimates[name]
                 if estimate.arrival_ns > since_ns]  # fmt: skip
-        truth = self.truth(max((message.step for message in seen), default=0))
+        truth = TrueStates(self.configuration)
         return sum(holds(message, truth[message.step]) for message in seen), len(seen)
+
+
+class TrueStates:
+    """The true states, computed here: also of steps whose plant was dead."""
+
+    def __init__(self, configuration: Configuration) -> None:
+        assert configuration.plant is not None
+        self._schedule = Schedule(0, configuration.mesh.rate)
+        self._node = PlantNode(configuration, configuration.plant.name, "0" * 16, self._schedule)
+        self._known: list[Sequence[float]] = []
+
+    def __getitem__(self, step: int) -> Sequence[float]:
+        while len(self._known) < step:
+            due = self._schedule.time_of(len(self._known) + 1)
+            assert due is not None
+            self._known += [message.x for message in self._node.advance(due + 1000) if isinstance(message, Truth)]
+        return self._known[step - 1]
 
 
 def holds(message: Posterior, x: Sequence[float]) -> bool:

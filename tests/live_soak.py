@@ -1,0 +1,127 @@
+"""A mesh that runs for long: everyone's memory, what was lost, and whether every estimate holds the truth."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from live_mesh import LiveMesh, Observer, Seen, TrueStates, holds
+
+MIB = 2**20
+MOST_GROWTH = 0.02
+"""Of a peer's memory from the third quarter of a run to the last, or ``MOST_MIB``, whichever is more."""
+MOST_MIB = 4.0
+LONGEST_LATENCIES = 200_000
+
+
+class Counting(Observer):
+    """Checks each estimate as it comes and keeps none."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.truth = TrueStates(self.configuration)
+        self.count = self.inside = 0
+        self.last_step: dict[str, int] = {}
+        self.latencies_ms: list[float] = []
+
+    def note(self, seen: Seen) -> None:
+        message = seen.message
+        self.count += 1
+        self.inside += holds(message, self.truth[message.step])
+        self.last_step[message.name] = max(message.step, self.last_step.get(message.name, 0))
+        is_first = message.topic == "fused" and message.revision == 0
+        if is_first and message.used and len(self.latencies_ms) < LONGEST_LATENCIES:
+            self.latencies_ms.append((seen.arrival_ns - message.origin_ns) * 1e-6)
+        self.estimates[message.name] = [seen]
+
+
+@dataclass
+class Report:
+    """What the run was like."""
+
+    seconds: float
+    rate: float
+    estimates: int
+    inside: int
+    lost: float
+    behind: float
+    lag: int
+    p50_ms: float
+    p99_ms: float
+    memory: dict[str, list[float]] = field(default_factory=dict)
+    """MiB of each peer, once a second."""
+
+    def growth(self, name: str) -> float:
+        """MiB from the third quarter to the last, by their medians."""
+        third, last = quarters(self.memory[name])[2:]
+        return statistics.median(last) - statistics.median(third)
+
+    def grows(self) -> list[str]:
+        """Peers whose memory does not level off."""
+        return [
+            name
+            for name, samples in self.memory.items()
+            if self.growth(name) > max(MOST_MIB, MOST_GROWTH * statistics.median(samples))
+        ]
+
+    def is_broken(self) -> bool:
+        """Whether a promise was broken."""
+        return self.inside < self.estimates or self.lost > 0 or bool(self.grows())
+
+    def table(self) -> str:
+        """In Markdown."""
+        told = (
+            f"{self.seconds / 60:.1f} minutes at {self.rate:g} Hz: {self.inside} of {self.estimates} estimates hold "
+            f"the truth, {self.lost:g} messages lost, {self.behind:g} steps finished without publication, "
+            f"{self.lag} steps behind at the end; a fused set came {self.p50_ms:.1f} ms after its oldest measurement "
+            f"was sent (p99 {self.p99_ms:.1f} ms)."
+        )
+        lines = [
+            told,
+            "",
+            "| peer | memory in the 1st quarter | 2nd | 3rd | 4th | grows by |",
+            "|---|---|---|---|---|---|",
+        ]
+        for name, samples in self.memory.items():
+            medians = [f"{statistics.median(quarter):.1f} MiB" for quarter in quarters(samples)]
+            lines.append(f"| {name} | {' | '.join(medians)} | {self.growth(name):+.1f} MiB |")
+        return "\n".join(lines)
+
+
+def quarters(samples: Sequence[float]) -> list[Sequence[float]]:
+    """Four parts of one length."""
+    size = max(1, len(samples) // 4)
+    return [samples[i * size : (i + 1) * size] for i in range(4)]
+
+
+def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
+    """Run the demo and watch it."""
+    topics = ("posterior", "fused", "health", "event")
+    with LiveMesh(folder, overrides, topics=topics, observer=Counting) as mesh:
+        observer = mesh.observer
+        assert isinstance(observer, Counting)
+        mesh.until(lambda: len(observer.last_step) == len(mesh.estimators()), "estimates flow")
+        processes = {name: mesh.process(name) for _, name in mesh.peers}
+        memory: dict[str, list[float]] = {name: [] for name in processes}
+        began = time.monotonic()
+        while time.monotonic() - began < seconds:
+            for name, process in processes.items():
+                memory[name].append(process.memory_info().rss / MIB)
+            time.sleep(min(1.0, seconds / 40))
+        lag = mesh.due() - min(observer.last_step.values())
+        behind = sum(health[-1][1].counters.get("behind", 0.0) for health in observer.health.values())
+        cuts = statistics.quantiles(observer.latencies_ms, n=100)
+        mesh.process("plant").terminate()  # then what is under way comes to an end
+        plant = mesh.child("plant").process
+        assert plant is not None
+        plant.wait()
+        since = mesh.clock.now()
+        mesh.until(
+            lambda: all(h[-1][0] > since for n, h in observer.health.items() if n != "plant"), "a last word", 120
+        )
+        lost = sum(mesh.gaps().values())
+        rate = mesh.configuration.mesh.rate
+        return Report(seconds, rate, observer.count, observer.inside, lost, behind, lag, cuts[49], cuts[98], memory)
