@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -59,8 +60,6 @@ class Step:
     arrived: dict[str, Message] = field(default_factory=dict)
     """Newest message of each source."""
     input: Input | None = None
-    seen: int | None = None
-    """When the first message of the step came."""
     before: object | None = None
     """The set before the step's data, for rewinding."""
     reach: object | None = None
@@ -106,6 +105,8 @@ class Estimator(Node):
         """Whether the data of the current step are in the set."""
         self._steps: dict[int, Step] = {}
         self._newest = 0
+        self._signs: list[tuple[int, int]] = []
+        """Each step that was the newest when it was first heard of, and when that was; both rise."""
         self._heard_at: int | None = None
         """When the last message came, of whatever step."""
         self._first_evidence: int | None = None
@@ -217,11 +218,10 @@ class Estimator(Node):
         self._heard_at = now
         if k > self._newest:
             self._newest = k
+            self._signs.append((k, now))
         if self._first_evidence is None:
             self._first_evidence = now
         step = self._steps.setdefault(k, Step())
-        if step.seen is None:
-            step.seen = now
         if len(self._steps) > MOST_STEPS and self.current is None:
             del self._steps[min(self._steps)]
         return step
@@ -267,8 +267,8 @@ class Estimator(Node):
 
     def _first_sign(self, k: int) -> int | None:
         """When the step, or one after it, was first heard of."""
-        seen = [step.seen for j, step in self._steps.items() if j >= k and step.seen is not None]
-        return min(seen) if seen else None
+        i = bisect_left(self._signs, (k,))
+        return self._signs[i][1] if i < len(self._signs) else None
 
     def wakeup(self) -> int | None:
         if self.current is None:
@@ -338,8 +338,8 @@ class Estimator(Node):
         if not self._predict_set(k, u, now):
             return False
         self.current, self._combined = k + 1, False
-        for old in [j for j in self._steps if j < k + 1 - self.history]:
-            del self._steps[old]
+        self._steps.pop(k - self.history, None)  # one step forward, one is forgotten: never a search of the backlog
+        del self._signs[: bisect_left(self._signs, (k + 1 - self.history,))]
         return True
 
     def _predict_set(self, k: int, u: Vector | Orthotope | None, now: int) -> bool:
