@@ -79,6 +79,7 @@ class Proxy:
 
     async def _end(self) -> None:
         self._server.close()
+        await asyncio.sleep(0.02)  # what was accepted just now gets its transport, else nobody would close it
         self._close_all()
         others = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
         for task in others:
@@ -92,24 +93,23 @@ class Proxy:
             writer.transport.abort()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if self._is_cut:
-            writer.transport.abort()
-            return
         try:
-            there, onward = await asyncio.open_connection("127.0.0.1", self._target)
-        except OSError:
+            if not self._is_cut:
+                await self._forward(reader, writer)
+        except (OSError, asyncio.CancelledError):
+            return  # there is no target, or the proxy ends
+        finally:
             writer.transport.abort()
-            return
+
+    async def _forward(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        there, onward = await asyncio.open_connection("127.0.0.1", self._target)
         self._writers |= {writer, onward}
         self.connections += 1
         try:
             await _until_one_ends(*self._direction(reader, onward), *self._direction(there, writer))
-        except asyncio.CancelledError:
-            return  # the proxy ends
         finally:
             self.connections -= 1
             self._writers -= {writer, onward}
-            writer.transport.abort()
             onward.transport.abort()
 
     def _direction(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> tuple[Work, Work]:
