@@ -12,7 +12,7 @@ from lsu_mesh import LSUModel, Orthotope
 
 Exact = list[Fraction]
 
-KINDS = ("stable", "unstable", "singular", "rank one", "degenerate", "dyadic", "flat prior")
+KINDS = ("stable", "unstable", "singular", "rank one", "degenerate", "dyadic", "flat prior", "mixed scales")
 
 
 class Case(NamedTuple):
@@ -32,7 +32,10 @@ class Step(NamedTuple):
 
 
 def draw_case(rng: np.random.Generator, kind: str) -> Case:
-    """A random model of this kind: n 1–6, m 1–4, scale 1e-6 … 1e6, an input in half of the cases."""
+    """A random model of this kind: n 1–6, m 1–4, scale 1e-6 … 1e6, an input in half of the cases.
+
+    With mixed scales each state and each output has a unit of its own, 1e-6 … 1e6 of the others'.
+    """
     n, m = int(rng.integers(1, 7)), int(rng.integers(1, 5))
     scale = 10.0 ** int(rng.integers(-6, 7))
     if kind == "dyadic":  # everything is representable for some steps, so that r = 0 and rho = 0 can be true
@@ -53,7 +56,13 @@ def draw_case(rng: np.random.Generator, kind: str) -> Case:
     center, widths = scale * rng.normal(size=n), scale * (0.1 + rng.random(n))
     if kind == "flat prior":
         widths *= rng.choice([0.0, 1.0], size=n)
-    model = LSUModel(A, B, rng.normal(size=(m, n)), rho, r, noise_map)
+    C = rng.normal(size=(m, n))
+    if kind == "mixed scales":
+        units, output_units = 10.0 ** rng.uniform(-6, 6, n), 10.0 ** rng.uniform(-6, 6, m)
+        A, C = A * units[:, None] / units, C * output_units[:, None] / units
+        B = None if B is None else B * units[:, None]
+        rho, r, center, widths = rho * units, r * output_units, center * units, widths * units
+    model = LSUModel(A, B, C, rho, r, noise_map)
     return Case(model, Orthotope(center - widths, center + widths), bool(rng.random() < 0.3))
 
 

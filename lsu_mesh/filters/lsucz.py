@@ -22,6 +22,7 @@ from lsu_mesh.filters.gain import hull_gain
 from lsu_mesh.kernels.constrained import meet_sets, meet_strips
 from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
 from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.arrays import box_volume
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.reduction import Body, Limits, settle
@@ -129,8 +130,7 @@ class LSUCZ(Filter):
         """Volume of :attr:`support` up to dimension 3, above it of :meth:`bounds`: cheap enough for each step."""
         if self._model.state_count <= LARGEST_EXACT_VOLUME:
             return self.support.volume()
-        lower, upper = self.bounds()
-        return float(np.prod(upper - lower))
+        return box_volume(*self.bounds())
 
     def predict_output(self) -> OutputPrediction:
         """``C X ⊕ [−r, r]`` by safe linear programs, met with interval arithmetic over :meth:`bounds`."""

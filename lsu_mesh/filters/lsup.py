@@ -44,8 +44,9 @@ class LSUP(CompiledFilter):
         interval hull.
     time_update:
         ``"image"``: edges along A T, which reproduces the papers; ``"cgz"``: noise generators take the place of edges,
-        one at a time, where that leaves less volume; ``"edges"``: the best n of all edges, n ≤ 6; ``"strips"``: the
-        image, then the faces of the circumscribed box as strips.
+        one at a time, where that leaves less volume; ``"edges"``: the best n of all edges, n ≤ 6 (as ``"cgz"`` at a
+        step whose unknown inputs leave more than 924 choices); ``"strips"``: the image, then the faces of the
+        circumscribed box as strips.
 
     Raises ``ModelError`` on options or a prior that do not fit.
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -76,6 +78,7 @@ def _with_settings(compile_signature: Callable[[Any], Any], optimisation: int) -
     """Compile for loops over a handful of entries: vectorised, they take twice as long to compile *and* to run."""
 
     def compile_small_loops(signature: Any) -> Any:
+        _load_registries_without_scipy()
         before = config.OPT, config.LOOP_VECTORIZE
         config.OPT, config.LOOP_VECTORIZE = type(config.OPT)(optimisation), 0
         try:
@@ -84,6 +87,23 @@ def _with_settings(compile_signature: Callable[[Any], Any], optimisation: int) -
             config.OPT, config.LOOP_VECTORIZE = before
 
     return compile_small_loops
+
+
+@functools.cache
+def _load_registries_without_scipy() -> None:
+    """numba loads SciPy's linear algebra with its registries, only to know that a BLAS is there; no kernel calls it.
+
+    SciPy is installed with this package, so the answer is known, and a new process is a quarter faster. Whoever
+    compiles a product of matrices later has numba load SciPy then.
+    """
+    if "numba.np.arraymath" not in sys.modules:
+        linalg: Any = importlib.import_module("numba.np.linalg")
+        ask = linalg.ensure_blas
+        linalg.ensure_blas = lambda: None
+        try:
+            importlib.import_module("numba.np.arraymath").ensure_blas = ask  # type: ignore[attr-defined]
+        finally:
+            linalg.ensure_blas = ask
 
 
 @functools.cache

@@ -1,7 +1,8 @@
 """Time updates that choose the edges of the enclosing parallelotope among those of ``A P`` and of the noise.
 
-The candidates are the columns of ``[T  G diag(widths)]``. Which of them become edges is found in plain floating point;
-the zonotope is then enclosed along these edges and verified as any other (``kernels/enclosure.py``).
+The candidates are the columns of ``[T  G diag(widths)]`` without those of width 0. Which of them become edges is found
+in plain floating point; the zonotope is then enclosed along these edges and verified as any other
+(``kernels/enclosure.py``).
 """
 
 from __future__ import annotations
@@ -31,16 +32,20 @@ from lsu_mesh.kernels.scratch import (
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
+MOST_COMBINATIONS = 924.0
+"""Combinations that an exhaustive search tries: those of 6 among 12 edges. More come of unknown inputs only."""
+
 
 @inner
 def choose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, exhaustive: bool, work: Scratch) -> None:
     """Edges that leave little volume: greedy swaps, or ``exhaustive`` the best n of all candidates.
 
-    Afterwards T holds the chosen edges; ``candidates_of`` and ``weights_of`` the scratch are the other generators of
-    ``T ⊕ G diag(widths)``; the rounding of the products went to delta.
+    Greedy too where there are more than ``MOST_COMBINATIONS``. Afterwards T holds the chosen edges; ``candidates_of``
+    and ``weights_of`` the scratch are the other generators of ``T ⊕ G diag(widths)``; the rounding of the products
+    went to delta.
     Source: Chisci, Garulli & Zappa 1996, theorem 1.
     """
-    n, count = T.shape[0], T.shape[0] + widths.size
+    n, count = T.shape[0], T.shape[0]
     candidates, weights = candidates_of(work, n, widths.size), weights_of(work, n, widths.size)
     chosen, best = row(work, n, CHOSEN), row(work, n, BEST)
     edges, inverse, factor = square(work, n, BASIS), square(work, n, INVERSE), square(work, n, FACTOR)
@@ -49,18 +54,23 @@ def choose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, exhaustive: bool
         rounded = 0.0
         for j in range(n):
             candidates[i, j], edges[i, j] = T[i, j], T[i, j]
+        count = n
         for j in range(widths.size):
-            candidates[i, n + j] = G[i, j] * widths[j]
-            rounded += abs(candidates[i, n + j])
+            if widths[j] > 0.0:
+                candidates[i, count] = G[i, j] * widths[j]
+                rounded += abs(candidates[i, count])
+                count += 1
+        for q in range(count, n + widths.size):
+            candidates[i, q] = 0.0
         delta[i] = up(delta[i] + EPSILON * rounded)
-    if exhaustive:
+    if exhaustive and _combinations(n, count) <= MOST_COMBINATIONS:
         _find_best(candidates, count, chosen, best, edges, inverse, factor)
     else:
         for q in range(n, count):
-            if widths[q - n] > 0.0 and invert(edges, inverse, factor):
+            if invert(edges, inverse, factor):
                 _swap(edges, inverse, candidates, q, row(work, n, ENCLOSE), chosen)
-    for q in range(count):
-        weights[q] = 1.0
+    for q in range(n + widths.size):
+        weights[q] = 1.0 if q < count else 0.0
     for j in range(n):
         weights[int(chosen[j])] = 0.0
         for i in range(n):
@@ -138,6 +148,15 @@ def _log_volume_along(edges: Matrix, candidates: Matrix, count: int, inverse: Ma
             reach += abs(entry)
         volume += math.log(reach)
     return volume if math.isfinite(volume) else math.inf
+
+
+@inner
+def _combinations(n: int, count: int) -> float:
+    """Combinations of n among count."""
+    number = 1.0
+    for j in range(n):
+        number *= (count - j) / (j + 1.0)
+    return number
 
 
 @inner

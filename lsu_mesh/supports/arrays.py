@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
 
 Array = NDArray[np.float64]
+
+MOST_EDGES = 16
+"""A box with more edge directions has more than 65 536 corners: they are not enumerated."""
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
@@ -44,3 +49,17 @@ def map_arguments(R: ArrayLike, shift: ArrayLike | None, n: int) -> tuple[Array,
     matrix = np.array(finite_array("R", R, (None, n)))
     k = matrix.shape[0]
     return matrix, np.zeros(k) if shift is None else np.array(finite_array("shift", shift, (k,)))
+
+
+def box_volume(lower: Array, upper: Array) -> float:
+    """``Π (upper_i − lower_i)``; inf where it is too large for a double."""
+    return math.prod((upper - lower).tolist())
+
+
+def corners_are_few(edges: int) -> None:
+    """Raises ``ModelError`` where 2^edges corners are too many to be listed."""
+    if edges > MOST_EDGES:
+        raise ModelError(
+            f"a set with {edges} edge directions has 2^{edges} corners, up to 2^{MOST_EDGES} are listed: "
+            "project it first, as in support.linear_map([[1, 0, …], [0, 1, …]])"
+        )

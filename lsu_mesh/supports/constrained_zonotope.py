@@ -14,7 +14,7 @@ from lsu_mesh.kernels.constrained import meet_sets, meet_strips
 from lsu_mesh.kernels.hull import open_program
 from lsu_mesh.kernels.surface import split_triangles
 from lsu_mesh.kernels.zonotope import absorb_box, add_centers, zonotope_map, zonotope_radius
-from lsu_mesh.supports.arrays import finite_array, frozen, map_arguments
+from lsu_mesh.supports.arrays import box_volume, finite_array, frozen, map_arguments
 from lsu_mesh.supports.exact import Membership
 from lsu_mesh.supports.exact_program import exact_solution
 from lsu_mesh.supports.linear_programs import is_proved_empty, safe_maxima
@@ -166,7 +166,7 @@ class ConstrainedZonotope(Support):
         if self.is_empty():
             return 0.0
         exact = self._polytope().volume if self.dim <= LARGEST_EXACT_VOLUME else math.nan
-        return float(np.prod(np.subtract(*self.bounds()[::-1]))) if math.isnan(exact) else exact
+        return box_volume(*self.bounds()) if math.isnan(exact) else exact
 
     def vertices(self) -> Matrix:
         """Vertices (k, n) by refinement with support points; (0, n) for a set proved empty."""

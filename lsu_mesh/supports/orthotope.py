@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels.rounding import EPSILON, UNDERFLOW
-from lsu_mesh.supports.arrays import finite_array
+from lsu_mesh.supports.arrays import box_volume, corners_are_few, finite_array
 from lsu_mesh.supports.support import Matrix, Support, Vector
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Orthotope(Support):
         return self.lower, self.upper
 
     def volume(self) -> float:
-        return float(np.prod(self.upper - self.lower))
+        return box_volume(self.lower, self.upper)
 
     def log_volume(self) -> float:
         widths = self.upper - self.lower
@@ -81,7 +81,8 @@ class Orthotope(Support):
         return float(products.sum() + error)
 
     def vertices(self) -> Matrix:
-        pairs = ((lo,) if lo == hi else (lo, hi) for lo, hi in zip(self.lower, self.upper, strict=True))
+        pairs = [(lo,) if lo == hi else (lo, hi) for lo, hi in zip(self.lower, self.upper, strict=True)]
+        corners_are_few(sum(len(pair) > 1 for pair in pairs))
         return np.array(list(itertools.product(*pairs)))
 
     def linear_map(self, R: ArrayLike, shift: ArrayLike | None = None) -> Support:

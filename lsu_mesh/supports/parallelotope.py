@@ -13,7 +13,7 @@ from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels import linear_algebra, parallelotope, step, strip
 from lsu_mesh.kernels.enclosure import enclose_along_edges
 from lsu_mesh.kernels.scratch import scratch
-from lsu_mesh.supports.arrays import finite_array, frozen
+from lsu_mesh.supports.arrays import corners_are_few, finite_array, frozen
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
 from lsu_mesh.supports.support import Matrix, Support, Vector
 
@@ -84,6 +84,7 @@ class Parallelotope(Support):
         return float(np.nextafter(np.nextafter(s + spread, np.inf) + error, np.inf))
 
     def vertices(self) -> Matrix:
+        corners_are_few(self.dim)
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=self.dim)))
         return np.unique(self._center + signs @ self._generators.T, axis=0)
 

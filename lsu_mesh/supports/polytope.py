@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.errors import ModelError
+
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
@@ -28,10 +30,12 @@ FLAT = 1e-11
 """A width below this share of the largest width counts as none."""
 CONFIRMED = 1e-9
 """A facet is confirmed when no point lies farther than this, in units of the inscribed simplex."""
-
-
 MOST_VERTICES = 6_000
 """Where more are found the enumeration stops: in dimension five and six a small set can have millions."""
+MOST_FACETS = 400_000
+"""Facets of all rounds together at which it stops too: some seconds of work, whatever the set."""
+LARGEST_DIMENSION = 8
+"""Sets that span more dimensions are not enumerated: their simplest hulls have too many facets."""
 
 
 class Polytope(NamedTuple):
@@ -42,9 +46,17 @@ class Polytope(NamedTuple):
 
 
 def enumerate_polytope(support_points: SupportPoints, n: int, surface: Surface | None = None) -> Polytope:
-    """The polytope whose support points are given; n ≥ 1. ``surface`` may find most vertices of a solid in one go."""
+    """The polytope whose support points are given; n ≥ 1. ``surface`` may find most vertices of a solid in one go.
+
+    Raises ``ModelError`` where the set spans more than eight dimensions.
+    """
     points, simplex = _inscribed_simplex(support_points, n)
     k = simplex.shape[0] - 1
+    if k > LARGEST_DIMENSION:
+        raise ModelError(
+            f"the vertices of a set are enumerated up to dimension {LARGEST_DIMENSION}, it spans {k}: "
+            "project it first, as in support.linear_map([[1, 0, …], [0, 1, …]])"
+        )
     if k == 0:
         return Polytope(points[simplex], 0.0)
     origin = points[simplex[0]]
@@ -62,7 +74,8 @@ def enumerate_polytope(support_points: SupportPoints, n: int, surface: Surface |
         distinct = _distinct(local, np.empty((0, k)))
         points, local = points[distinct], local[distinct]
     points, indices, volume = _refine(support_points, points, local, inverse, origin)
-    scale = abs(float(np.linalg.det(edges))) if k == n else 0.0
+    with np.errstate(over="ignore"):  # a volume may be too large for a double
+        scale = abs(float(np.linalg.det(edges))) if k == n else 0.0
     return Polytope(points[indices], volume * scale)
 
 
@@ -112,13 +125,13 @@ def _refine(
     support_points: SupportPoints, points: Matrix, local: Matrix, inverse: Matrix, origin: Vector
 ) -> tuple[Matrix, NDArray[np.int64], float]:
     asked: set[tuple[float, ...]] = set()
+    seen = 0
     while True:
         hull = _convex_hull(local)
+        seen += len(hull.equations)
         facets = {tuple(row) for row in np.round(hull.equations, 9).tolist()} - asked
         if not facets:
             break
-        if len(hull.vertices) > MOST_VERTICES:
-            return points, np.asarray(hull.vertices, dtype=np.int64), math.nan
         planes = np.array(sorted(facets))
         found = support_points(planes[:, :-1] @ inverse)
         found_local = (found - origin) @ inverse.T
@@ -128,8 +141,16 @@ def _refine(
         fresh = np.flatnonzero(beyond)[_distinct(found_local[beyond], local)]
         if fresh.size == 0:
             break
+        if len(local) + fresh.size > MOST_VERTICES or seen + _facets_expected(hull, fresh.size) > MOST_FACETS:
+            return points, np.asarray(hull.vertices, dtype=np.int64), math.nan
         points, local = np.vstack([points, found[fresh]]), np.vstack([local, found_local[fresh]])
     return points, np.asarray(hull.vertices, dtype=np.int64), float(hull.volume)
+
+
+def _facets_expected(hull: ConvexHull, more: int) -> float:
+    """Facets of the hull with so many vertices more, by the growth of random polytopes."""
+    known = len(hull.vertices)
+    return float(len(hull.equations) * ((known + more) / known) ** max(1.0, hull.points.shape[1] / 4))
 
 
 def _convex_hull(points: Matrix) -> ConvexHull:

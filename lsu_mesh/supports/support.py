@@ -51,7 +51,11 @@ class Support(ABC):
 
     @abstractmethod
     def vertices(self) -> Matrix:
-        """Vertices (k, n) of the set in floating point, for drawing and measuring; no order is promised."""
+        """Vertices (k, n) of the set in floating point, for drawing and measuring; no order is promised.
+
+        ``ModelError`` where a box or parallelotope has more than 2^16, or another set spans more than 8 dimensions. A
+        set with thousands of vertices in five or more dimensions yields those of an inner approximation.
+        """
 
     @abstractmethod
     def linear_map(self, R: ArrayLike, shift: ArrayLike | None = None) -> Support:

@@ -15,7 +15,7 @@ from lsu_mesh.kernels.zonotope import (
     zonotope_radius,
     zonotope_support,
 )
-from lsu_mesh.supports.arrays import finite_array, frozen, map_arguments
+from lsu_mesh.supports.arrays import box_volume, finite_array, frozen, map_arguments
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.support import Matrix, Support, Vector
 
@@ -75,8 +75,7 @@ class Zonotope(Support):
     def volume(self) -> float:
         """``2ⁿ Σ |det G_S|`` over the n-subsets of columns; above 500 000 of them the volume of the interval hull."""
         if math.comb(self._generators.shape[1], self.dim) > LARGEST_SUM:
-            lower, upper = self.bounds()
-            return float(np.prod(upper - lower))
+            return box_volume(*self.bounds())
         return float(parallelotope_volumes(self._generators))
 
     def support(self, d: ArrayLike) -> float:

@@ -283,3 +283,18 @@ def test_more_than_one_state_of_noise_and_of_input_fits_every_time_update() -> N
         filter.predict(Orthotope([-1.0] * 3, [1.0] * 3))
         reach = np.abs(model.A).sum(axis=1) + np.abs(model.noise_map) @ model.rho + np.abs(model.B).sum(axis=1)
         assert (filter.bounds()[1] >= reach - 1e-9).all()
+
+
+@pytest.mark.parametrize("unknown", [False, True])
+def test_exhaustive_edges_stay_few_with_many_inputs(unknown: bool) -> None:
+    """6 states, 6 noises and 60 inputs would be 5e8 combinations; known inputs are no edges, unknown ones too many."""
+    rng = np.random.default_rng(4)
+    model = LSUModel(rng.normal(size=(6, 6)), rng.normal(size=(6, 60)), np.zeros((0, 6)), rng.random(6), 1.0)
+    assert model.B is not None
+    u, prior = rng.normal(size=60), Orthotope(-np.ones(6), np.ones(6))
+    filters = [LSUP(model, prior, time_update=name) for name in ("edges", "cgz")]  # type: ignore[arg-type]
+    for filter in filters:
+        filter.predict(Orthotope(u - 1.0, u + 1.0) if unknown else u)
+        reach = np.abs(model.A).sum(axis=1) + model.rho + (np.abs(model.B).sum(axis=1) if unknown else 0.0)
+        assert (filter.bounds()[1] >= model.B @ u + reach - 1e-9).all()
+    assert filters[0].volume() == filters[1].volume() if unknown else filters[0].volume() < filters[1].volume()

@@ -19,6 +19,7 @@ from lsu_mesh.supports.support import Support
 Maker = Callable[[LSUModel, Orthotope], Filter]
 MAKERS: dict[str, Maker] = {
     "LSUO": LSUO,
+    "LSUO lp": lambda model, prior: LSUO(model, prior, hull="lp"),
     "LSUO without meet": lambda model, prior: LSUO(model, prior, meet=False),
     "LSUP image": LSUP,
     "LSUP cgz": lambda model, prior: LSUP(model, prior, time_update="cgz"),

@@ -10,7 +10,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from lsu_mesh.errors import ModelError
+from lsu_mesh.supports import polytope
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.parallelotope import Parallelotope
+from lsu_mesh.supports.support import Support
+from lsu_mesh.supports.zonotope import Zonotope
 
 Array = NDArray[np.float64]
 
@@ -58,3 +64,51 @@ def farthest(drawn: ConstrainedZonotope, direction: Array) -> float:
     equalities = (drawn.A, drawn.b) if drawn.constraint_count else (None, None)
     found = linprog(-objective / size, A_eq=equalities[0], b_eq=equalities[1], bounds=(-1, 1))
     return float(direction @ drawn.center - found.fun * size)
+
+
+@pytest.mark.usefixtures("hurried")
+def test_a_set_of_more_facets_than_are_looked_at_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its vertices are some of the true ones, and its volume is that of the hull."""
+    monkeypatch.setattr(polytope, "MOST_FACETS", 2_000)
+    rng = np.random.default_rng(1)
+    drawn = Zonotope(np.zeros(6), rng.normal(size=(6, 40))).to_constrained_zonotope()
+    vertices, direction = drawn.vertices(), rng.normal(size=6)
+    assert len(vertices) >= 12
+    assert (vertices @ direction).max() <= drawn.support(direction)
+    lower, upper = drawn.bounds()
+    assert drawn.volume() == pytest.approx(float(np.prod(upper - lower)))
+
+
+@pytest.mark.usefixtures("hurried")
+def test_a_set_in_many_dimensions_is_enumerated_where_it_is_flat() -> None:
+    rng = np.random.default_rng(2)
+    assert len(Zonotope(np.zeros(30), rng.normal(size=(30, 2))).vertices()) == 4
+    flat = np.zeros(30)
+    flat[:3] = 1.0
+    assert len(Orthotope(-flat, flat).vertices()) == 8
+
+
+@pytest.mark.parametrize(
+    "support",
+    [
+        Orthotope(-np.ones(30), np.ones(30)),
+        Parallelotope(np.zeros(30), np.eye(30)),
+        Zonotope(np.zeros(30), np.eye(30)),
+        ConstrainedZonotope(np.zeros(30), np.eye(30), np.ones((1, 30)), [0.5]),
+    ],
+    ids=lambda support: type(support).__name__,
+)
+@pytest.mark.usefixtures("hurried")
+def test_too_many_vertices_are_refused_at_once(support: Support) -> None:
+    with pytest.raises(ModelError, match="project it first"):
+        support.vertices()
+
+
+@pytest.mark.parametrize("size", [1e120, 1e-120])
+def test_volumes_beyond_double_precision_are_no_error(size: float) -> None:
+    """Infinite or zero, without a warning (which would be an error here)."""
+    expected = np.inf if size > 1.0 else 0.0
+    widths = np.full(3, size)
+    box = Orthotope(-widths, widths)
+    assert [kind.volume() for kind in (box, box.to_parallelotope(), box.to_constrained_zonotope())] == [expected] * 3
+    assert Zonotope(np.zeros(3), size * np.ones((3, 200))).volume() == expected
