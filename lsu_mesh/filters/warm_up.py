@@ -1,10 +1,13 @@
 """Compile every kernel once, or load it from the cache, by doing a few steps of everything.
 
-``python -m lsu_mesh.filters.warm_up`` does it at set-up, so that no process compiles anything later.
+``python -m lsu_mesh.filters.warm_up`` does it at set-up, so that no process compiles anything later. Where the cache is
+empty and there are cores for it, two processes compile one half of the kernels each beforehand.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
 import time
 
@@ -13,6 +16,8 @@ import numpy as np
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.registry import FILTERS, filter_class
 from lsu_mesh.filters.run import run_filter
+from lsu_mesh.kernels import hull, step
+from lsu_mesh.kernels.compile import awaits_compilation
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import simulate
 from lsu_mesh.supports.orthotope import Orthotope
@@ -25,11 +30,15 @@ OPTIONS: dict[str, tuple[dict[str, object], ...]] = {
     "ZonotopicKalman": ({}, {"form": "predictor"}),
 }
 """Options whose code differs, by kind."""
+HALVES = {"step": ("LSUO", "LSUP", "LSUPB"), "programs": ("LSUCZ", "ZonotopicKalman")}
+"""Kinds of filters whose steps have few kernels in common."""
 
 
 def warm_up() -> float:
     """Run every filter for a few steps, with and without a noise map and a domain; the seconds that it took."""
     began = time.perf_counter()
+    if awaits_compilation(step.advance) and awaits_compilation(hull.maxima) and _cores() > 1:
+        _compile_in_two_processes()
     A, B, C = [[0.9, 0.2], [-0.1, 0.8]], [[0.1], [0.2]], [[1.0, 0.0], [1.0, 1.0]]
     prior = Orthotope([-1.0, -1.0], [1.0, 1.0])
     domain = Orthotope([-1.5, -1.5], [1.5, 1.5])
@@ -42,6 +51,31 @@ def warm_up() -> float:
                 run_filter(engine, data.Y, data.U)
                 _one_by_one(filter_class(kind)(model, prior, **options), data.Y, data.U)  # type: ignore[call-arg]
     return time.perf_counter() - began
+
+
+def _compile_in_two_processes() -> None:
+    """Fill the cache by one process for each half; what they leave out, or fail at, is compiled here afterwards."""
+    command = [sys.executable, "-m", "lsu_mesh.filters.warm_up"]
+    children = [subprocess.Popen([*command, half], stderr=subprocess.DEVNULL) for half in HALVES]
+    for child in children:
+        child.wait()
+
+
+def _compile_half(half: str) -> None:
+    """The steps of these filters alone, in the loop where they have one."""
+    model = LSUModel(np.eye(2), np.eye(2), np.eye(2), 0.05, 0.1)
+    for kind in HALVES[half]:
+        for options in OPTIONS.get(kind, ({},)):
+            if half == "step" and "hull" in options:
+                continue
+            engine = filter_class(kind)(model, Orthotope([-1.0, -1.0], [1.0, 1.0]), **options)  # type: ignore[call-arg]
+            run_filter(engine, np.zeros((STEPS, 2)), np.zeros((STEPS, 2)))
+            engine.update([0.0, 0.0])
+            engine.condition(engine.support.interval_hull())
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _one_by_one(engine: Filter, Y: np.ndarray, U: np.ndarray) -> None:
@@ -60,4 +94,7 @@ def _one_by_one(engine: Filter, Y: np.ndarray, U: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
-    print(f"kernels ready after {warm_up():.1f} s", file=sys.stderr)
+    if len(sys.argv) > 1:
+        _compile_half(sys.argv[1])
+    else:
+        print(f"kernels ready after {warm_up():.1f} s", file=sys.stderr)

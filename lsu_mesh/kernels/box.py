@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.borrow import block
-from lsu_mesh.kernels.compile import inlined, inner, kernel
+from lsu_mesh.kernels.compile import inlined, inner
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
 from lsu_mesh.kernels.scratch import BODY, BOX, DELTA, STRIP, Scratch, row, square
 from lsu_mesh.kernels.strip import EMPTY, OVERFLOW, STRIP_ROWS, TIGHTENED, UNCHANGED, cut, half_width, hull, middle
@@ -98,7 +98,7 @@ def update(
     return 0
 
 
-@kernel
+@inner
 def tighten(lower: Vector, upper: Vector, p: Vector, lo: float, hi: float) -> int:
     """Exact interval hull of the box and the strip ``lo ≤ p'x ≤ hi``, rounded outward, in place.
 

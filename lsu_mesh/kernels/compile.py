@@ -50,11 +50,6 @@ def inner(function: F) -> F:
     return _compiled(function, _NO_WRAPPERS, optimisation=1)
 
 
-def calling(function: F) -> F:
-    """As :func:`kernel`, for a function that does little but call kernels: those are not optimised once more."""
-    return _compiled(function, {}, optimisation=1)
-
-
 def inlined(function: F) -> F:
     """As :func:`kernel`, copied into each caller: for tiny functions that call nothing but such ones."""
     return _compiled(function, {"forceinline": True}, optimisation=1)
@@ -72,6 +67,12 @@ def _compiled(function: F, options: dict[str, Any], optimisation: int) -> F:
             compiled._cache._cache_file._source_stamp = _stamp(source.stem)
     compiled.compile = _with_settings(compiled.compile, optimisation)
     return cast(F, compiled)
+
+
+def awaits_compilation(compiled: Callable[..., object]) -> bool:
+    """Whether a kernel can be cached and its machine code, as its source is now, is not in the cache yet."""
+    file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+    return file is not None and not file._load_index()
 
 
 def _with_settings(compile_signature: Callable[[Any], Any], optimisation: int) -> Callable[[Any], Any]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import kernel
+from lsu_mesh.kernels.compile import inner, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.zonotope import padded, subtraction_error
 
@@ -97,7 +97,7 @@ def meet_sets(
     return generators, rows, sides
 
 
-@kernel
+@inner
 def absorb_rows(G: Array, A: Array, slack: Array) -> tuple[Array, Array]:
     """Loosen row i of ``A ξ = b`` by ``slack_i``: grow a column private to that row, or append one (see the module)."""
     n, g = G.shape

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.compile import inner
 from lsu_mesh.kernels.lifted import row_scales
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 
@@ -15,7 +15,7 @@ SMALLEST_PIVOT = 2.0**-10
 """Entries of a scaled constraint row below this are not used to eliminate a variable."""
 
 
-@kernel
+@inner
 def drop_constraint(n: int, L: Array, middle: Array, slack: Array) -> tuple[Array, Array, Array]:
     """Remove the constraint and the generator that are estimated to matter least; (N − 1, g − 1), (N − 1,), (N − 1,).
 
@@ -61,7 +61,7 @@ def overruns(n: int, L: Array, middle: Array, row_of: NDArray[np.int64], beyond:
                     row_of[j], beyond[j] = i, over
 
 
-@kernel
+@inner
 def movability(n: int, L: Array) -> Array:
     """``P_jj`` (g,): the square of the largest ξ_j among the moves d with ``A d = 0`` and ``|d|² + |G d|² = 1``.
 
@@ -108,7 +108,7 @@ def movability(n: int, L: Array) -> Array:
     return freedom
 
 
-@kernel
+@inner
 def eliminate(L: Array, middle: Array, slack: Array, i: int, j: int) -> None:
     """Clear column j in every row but the constraint i, by adding multiples of row i; slack takes the rounding.
 

@@ -26,7 +26,7 @@ LARGEST_RESIDUAL = 0.25
 """An approximate inverse with a larger ‖I − M T‖∞ is not used."""
 
 
-@kernel
+@inner
 def enclose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
     """``T ← T'`` with ``T'[−1,1]ⁿ ⊇ T[−1,1]ⁿ ⊕ G diag(widths)[−1,1]^q ⊕ box(delta)``, in place.
 
@@ -49,7 +49,7 @@ def enclose_along_edges(T: Matrix, G: Matrix, widths: Vector, delta: Vector, wor
     return _grow(T, inverse, grown, own, work, T)
 
 
-@kernel
+@inner
 def enclose_orthogonally(T: Matrix, G: Matrix, widths: Vector, delta: Vector, work: Scratch) -> bool:
     """As :func:`enclose`, with new edges: an orthogonal basis, the longest columns first, in row-scaled coordinates."""
     n, q = T.shape[0], widths.size

@@ -13,14 +13,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.compile import inner
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.scaling import unit_factor
 
 Array = NDArray[np.float64]
 
 
-@kernel
+@inner
 def lift(c: Array, G: Array, A: Array, b: Array) -> tuple[Array, Array, Array]:
     """``L`` (n + m, g), ``middle`` (n + m,) and ``slack`` = 0."""
     n, g = G.shape
@@ -38,7 +38,7 @@ def lift(c: Array, G: Array, A: Array, b: Array) -> tuple[Array, Array, Array]:
     return L, middle, np.zeros(n + m)
 
 
-@kernel
+@inner
 def unlift(n: int, L: Array, middle: Array) -> tuple[Array, Array, Array, Array]:
     """``(c, G, A, b)`` of a lifted set without slack."""
     N, g = L.shape
@@ -59,7 +59,7 @@ def unlift(n: int, L: Array, middle: Array) -> tuple[Array, Array, Array, Array]
     return c, G, A, b
 
 
-@kernel
+@inner
 def scale_constraints(n: int, L: Array, middle: Array, slack: Array) -> None:
     """Multiply each constraint row by the power of two that brings its largest entry into [½, 1); exact."""
     N, g = L.shape
@@ -75,7 +75,7 @@ def scale_constraints(n: int, L: Array, middle: Array, slack: Array) -> None:
             slack[i] *= factor
 
 
-@kernel
+@inner
 def rescale_variables(L: Array, middle: Array, slack: Array, low: Array, high: Array) -> None:
     """``ξ_j = mid_j + rad_j ξ'_j`` for variables known to lie in [low_j, high_j] (Scott et al. 2016, §4.2)."""
     N, g = L.shape
@@ -97,7 +97,7 @@ def rescale_variables(L: Array, middle: Array, slack: Array, low: Array, high: A
             L[i, j] = shrunk
 
 
-@kernel
+@inner
 def without_zero_columns(L: Array) -> Array:
     """L without the columns that are zero; exact."""
     N, g = L.shape

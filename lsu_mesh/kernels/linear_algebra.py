@@ -19,7 +19,7 @@ RANK_TOLERANCE = 1e-14
 """Columns whose residual falls below this share of the longest one take no direction of their own."""
 
 
-@kernel
+@inner
 def invert(T: Matrix, inverse: Matrix, factor: Matrix) -> bool:
     """Gauss–Jordan with row-scaled partial pivoting: ``inverse ≈ T⁻¹``; ``factor`` is scratch, all (n, n).
 

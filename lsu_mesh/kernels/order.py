@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inner, kernel
+from lsu_mesh.kernels.compile import inner
 from lsu_mesh.kernels.lifted import row_scales
 from lsu_mesh.kernels.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.scaling import unit_factor
@@ -20,7 +20,7 @@ FLOOR = 1e-13
 SHORTEST = 2.0**-300
 
 
-@kernel
+@inner
 def reduce_columns(L: Array, slack: Array, limit: int) -> Array:
     """Columns (N, ≤ limit) that generate a zonotope which contains ``L ξ ⊕ box(slack)``; limit ≥ N.
 
@@ -64,7 +64,7 @@ def reduce_columns(L: Array, slack: Array, limit: int) -> Array:
     return columns
 
 
-@kernel
+@inner
 def independent_columns(L: Array) -> tuple[Array, Indices]:
     """N independent columns (N, N) by elimination with full pivoting on scaled rows, and where each came from.
 
@@ -105,7 +105,7 @@ def independent_columns(L: Array) -> tuple[Array, Indices]:
     return D, origin
 
 
-@kernel
+@inner
 def approximate_inverse(D: Array) -> Array:
     """``M ≈ D⁻¹`` (N, N) by Gauss–Jordan elimination with pivoting of scaled rows; not finite for singular D."""
     N = D.shape[0]
@@ -177,7 +177,7 @@ def _least_harm(T: Array, length: Array, kept: NDArray[np.bool_]) -> int:
     return chosen
 
 
-@kernel
+@inner
 def swallow_column(D: Array, L: Array, j: int, T: Array, length: Array, slack: Array) -> None:
     """Lengthen the basis by |t| and add what ``L_j − D t`` leaves, rounded up, to the slack."""
     N = D.shape[0]
@@ -193,7 +193,7 @@ def swallow_column(D: Array, L: Array, j: int, T: Array, length: Array, slack: A
         length[k] = up(length[k] + abs(T[k, j]))
 
 
-@kernel
+@inner
 def swallow_box(columns: Array, M: Array, slack: Array) -> bool:
     """Lengthen the first N columns C in place until they generate ``C ξ ⊕ box(slack)``; ``False`` without a proof.
 
@@ -250,7 +250,7 @@ def _plus_image(given: Array, residual: Array, trial: Array, factor: float) -> A
     return image
 
 
-@kernel
+@inner
 def box_smallest(L: Array, slack: Array, limit: int) -> Array:
     """Columns (N, ≤ limit): N axes that hold box(slack) and the smallest columns of L, beside the largest ones.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import calling
+from lsu_mesh.kernels.compile import kernel
 from lsu_mesh.kernels.constrained import absorb_rows
 from lsu_mesh.kernels.elimination import drop_constraint
 from lsu_mesh.kernels.lifted import (
@@ -27,7 +27,7 @@ from lsu_mesh.kernels.zonotope import absorb_box
 Array = NDArray[np.float64]
 
 
-@calling
+@kernel
 def reduce_complexity(
     c: Array,
     G: Array,

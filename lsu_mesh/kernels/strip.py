@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.compile import inlined, kernel
+from lsu_mesh.kernels.compile import inlined, inner, kernel
 from lsu_mesh.kernels.rounding import UNDERFLOW, down, gamma, up
 
 Matrix = NDArray[np.float64]
@@ -71,7 +71,7 @@ def project(c: Vector, T: Matrix, delta: Vector, p: Vector, g: Vector) -> tuple[
     return s, error, up(spread + gamma(n) * spread)
 
 
-@kernel
+@inner
 def cut(c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, work: Matrix) -> int:
     """Replace the set by one of the same form that holds its part in the strip ``lo ≤ p'x ≤ hi``; in place.
 

@@ -53,7 +53,7 @@ def map_arguments(R: ArrayLike, shift: ArrayLike | None, n: int) -> tuple[Array,
 
 def box_volume(lower: Array, upper: Array) -> float:
     """``Π (upper_i − lower_i)``; inf where it is too large for a double."""
-    return math.prod((upper - lower).tolist())
+    return float(math.prod((upper - lower).tolist()))
 
 
 def corners_are_few(edges: int) -> None:

@@ -7,13 +7,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from from_python import from_python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lsu_mesh.kernels.enclosure import enclose, enclose_along_edges
-from lsu_mesh.kernels.linear_algebra import invert
+from lsu_mesh.kernels import enclosure, linear_algebra
+from lsu_mesh.kernels.enclosure import enclose_along_edges
 from lsu_mesh.kernels.scratch import scratch
 from lsu_mesh.supports.exact import Membership, _eliminate, parallelotope_membership
+
+enclose, invert = from_python(enclosure.enclose), from_python(linear_algebra.invert)
 
 
 def corners(

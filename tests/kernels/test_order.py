@@ -6,11 +6,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from from_python import from_python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lsu_mesh.kernels.order import approximate_inverse, box_smallest, reduce_columns, swallow_box, swallow_column
+from lsu_mesh.kernels import order
 from lsu_mesh.supports.exact_program import exact_solution
+
+approximate_inverse, reduce_columns = from_python(order.approximate_inverse), from_python(order.reduce_columns)
+box_smallest, swallow_column = from_python(order.box_smallest), from_python(order.swallow_column)
+swallow_box = from_python(order.swallow_box)
 
 
 def _generates(columns: np.ndarray, point: list[Fraction]) -> bool:

@@ -6,13 +6,18 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from from_python import from_python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lsu_mesh.kernels.elimination import drop_constraint, eliminate, movability
-from lsu_mesh.kernels.lifted import lift, rescale_variables, scale_constraints, unlift, without_zero_columns
+from lsu_mesh.kernels import elimination, lifted
 from lsu_mesh.kernels.reduction import reduce_complexity
 from lsu_mesh.supports.exact_program import exact_solution
+
+drop_constraint, eliminate = from_python(elimination.drop_constraint), from_python(elimination.eliminate)
+movability, lift, unlift = from_python(elimination.movability), from_python(lifted.lift), from_python(lifted.unlift)
+rescale_variables, scale_constraints = from_python(lifted.rescale_variables), from_python(lifted.scale_constraints)
+without_zero_columns = from_python(lifted.without_zero_columns)
 
 Lifted = tuple[np.ndarray, np.ndarray, np.ndarray]
 

@@ -7,15 +7,17 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from from_python import from_python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from lsu_mesh.kernels import strip
-from lsu_mesh.kernels.box import tighten
-from lsu_mesh.kernels.enclosure import enclose
+from lsu_mesh.kernels import box, enclosure, strip
 from lsu_mesh.kernels.scratch import scratch
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
+
+cut_in_place, tighten = from_python(strip.cut), from_python(box.tighten)
+enclose = from_python(enclosure.enclose)
 
 
 class Cut(NamedTuple):
@@ -34,7 +36,7 @@ class Cut(NamedTuple):
 
 def cut(c: np.ndarray, T: np.ndarray, p: np.ndarray, lo: float, hi: float) -> Cut:
     new_c, new_T, delta = c.copy(), T.copy(), np.zeros(len(c))
-    status = strip.cut(new_c, new_T, delta, p, lo, hi, np.zeros((strip.STRIP_ROWS, len(c))))
+    status = cut_in_place(new_c, new_T, delta, p, lo, hi, np.zeros((strip.STRIP_ROWS, len(c))))
     return Cut(c, T, p, lo, hi, status, new_c, new_T, delta)
 
 

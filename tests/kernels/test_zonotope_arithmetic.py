@@ -7,10 +7,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from from_python import from_python
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lsu_mesh.kernels.constrained import absorb_rows, meet_sets, meet_strips
+from lsu_mesh.kernels import constrained
+from lsu_mesh.kernels.constrained import meet_sets, meet_strips
 from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
 from lsu_mesh.kernels.zonotope import (
     absorb_box,
@@ -21,6 +23,8 @@ from lsu_mesh.kernels.zonotope import (
     zonotope_support,
 )
 from lsu_mesh.supports.exact_program import exact_solution
+
+absorb_rows = from_python(constrained.absorb_rows)
 
 Exact = list[Fraction]
 
