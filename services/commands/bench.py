@@ -20,6 +20,10 @@ Cells = Sequence[str]
 
 
 def main(options: argparse.Namespace) -> int:
+    if options.what == "tightness":
+        from services.commands import tightness
+
+        return tightness.main(options)
     from lsu_mesh.experiments.kernel_speed import figures, report
 
     if options.out is not None and not _can_draw():

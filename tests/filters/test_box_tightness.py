@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import json
-import os
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +12,6 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection
 
 from lsu_mesh import LSUO, LSUP, LSUPB, LSUModel, Orthotope, metrics, run_filter, simulate, systems
 from lsu_mesh.filters.filter import Filter
-
-BENCHMARKS = Path(os.environ.get("LSU_MESH_BENCHMARKS", Path(__file__).parents[2].parent / "shared" / "benchmarks"))
 
 
 def prior_of(model: LSUModel, width: float = 1.0) -> Orthotope:
@@ -138,31 +133,3 @@ def test_a_bundle_does_not_elongate() -> None:
     ]
     bundle, strips = [metrics.mean_width(run.lower[200:], run.upper[200:]).max() for run in runs]
     assert bundle < strips / 2
-
-
-@pytest.mark.parametrize("name", ["twodim", "vehicle2", "pedestrian4"])
-def test_the_bundle_beats_the_published_estimators(name: str) -> None:
-    """Mean hull radius ÷ exact at the last step, beside the estimators of CORA other than constrained zonotopes."""
-    path = BENCHMARKS / f"{name}.json"
-    if not path.exists():
-        pytest.skip(f"{path} is not there")
-    data = json.loads(path.read_text())
-    system, tightness = data["system"], data["tightness"]
-    W, reach = np.array(system["W"]["generators"]), np.abs(system["R0"]["generators"]).sum(axis=1)
-    r = np.abs(system["V"]["generators"]).sum(axis=1)
-    model = LSUModel(system["A"], system["B"], system["C"], np.ones(W.shape[1]), r, noise_map=W)
-    filter = LSUPB(model, Orthotope(system["R0"]["center"] - reach, system["R0"]["center"] + reach))
-    last = tightness["k"]
-    for k, (y, u) in enumerate(zip(np.array(system["y"]).T, np.array(system["u"]).T, strict=True)):
-        filter.update(y)
-        lower, upper = filter.bounds()
-        if str(k) in data["exact_hulls"]:
-            exact = data["exact_hulls"][str(k)]
-            assert (lower <= np.array(exact["lo"]) + 1e-7).all()
-            assert (upper >= np.array(exact["hi"]) - 1e-7).all()
-        if k == last:
-            break
-        filter.predict(u)
-    mean_ratio = ((upper - lower) / 2 / np.array(tightness["exact_radius"])).mean()
-    others = {kind: entry["mean_ratio"] for kind, entry in tightness["estimators"].items() if not kind.startswith("CZ")}
-    assert mean_ratio < min(others.values())

@@ -1,72 +1,11 @@
-"""How tight LSU-CZ is: against exact hulls, on the published benchmarks and on P3."""
+"""How tight LSU-CZ is on P3, against exact hulls."""
 
 from __future__ import annotations
-
-import json
-import os
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from lsu_mesh import LSUCZ, LSUModel, Orthotope, systems
-
-FOLDER = Path(os.environ.get("LSU_MESH_BENCHMARKS", Path(__file__).parents[2].parent / "shared" / "benchmarks"))
-
-
-def _benchmark(name: str) -> dict[str, Any]:
-    path = FOLDER / f"{name}.json"
-    if not path.exists():
-        pytest.skip(f"{path} is not there")
-    return dict(json.loads(path.read_text()))
-
-
-def _hulls(data: dict[str, Any], *limits: int | None) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Interval hull after each update; the noise is a zonotope with generators W."""
-    system = data["system"]
-    W, V = np.array(system["W"]["generators"]), np.array(system["V"]["generators"])
-    prior = np.array(system["R0"]["center"]), np.abs(system["R0"]["generators"]).sum(axis=1)
-    model = LSUModel(system["A"], system["B"], system["C"], np.ones(W.shape[1]), np.abs(V).sum(axis=1), noise_map=W)
-    estimator = LSUCZ(model, Orthotope(prior[0] - prior[1], prior[0] + prior[1]), *limits)
-    hulls = []
-    for y, u in zip(np.array(system["y"]).T, np.array(system["u"]).T, strict=True):
-        estimator.update(y)
-        hulls.append(estimator.bounds())
-        estimator.predict(u)
-    return hulls
-
-
-@pytest.mark.parametrize("name", ["twodim", "vehicle2"])
-def test_unreduced_hulls_are_exact(name: str) -> None:
-    data = _benchmark(name)
-    hulls = _hulls(data, None, None)
-    for step, exact in data["exact_hulls"].items():
-        lower, upper = hulls[int(step)]
-        scale = max(1.0, np.abs([exact["lo"], exact["hi"]]).max())
-        assert np.abs(lower - exact["lo"]).max() <= 1e-9 * scale
-        assert np.abs(upper - exact["hi"]).max() <= 1e-9 * scale
-
-
-@pytest.mark.parametrize("name", ["twodim", "vehicle2", "pedestrian4"])
-@pytest.mark.parametrize("limits", [(12, 4), (20, 8)])
-def test_reduced_hulls_contain_the_exact_ones(name: str, limits: tuple[int, int]) -> None:
-    data = _benchmark(name)
-    hulls = _hulls(data, *limits)
-    for step, exact in data["exact_hulls"].items():
-        lower, upper = hulls[int(step)]
-        scale = max(1.0, np.abs([exact["lo"], exact["hi"]]).max())
-        assert (lower <= np.array(exact["lo"]) + 1e-9 * scale).all()
-        assert (upper >= np.array(exact["hi"]) - 1e-9 * scale).all()
-
-
-@pytest.mark.parametrize("name", ["twodim", "vehicle2"])
-def test_it_beats_every_published_estimator_that_is_no_constrained_zonotope(name: str) -> None:
-    data = _benchmark(name)
-    lower, upper = _hulls(data, 20, 8)[data["tightness"]["k"]]
-    ratio = (0.5 * (upper - lower) / data["tightness"]["exact_radius"]).mean()
-    others = {k: v["mean_ratio"] for k, v in data["tightness"]["estimators"].items() if not k.startswith("CZN")}
-    assert ratio < min(others.values())
 
 
 def _measured(model: LSUModel, seed: int, steps: int, spread: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
