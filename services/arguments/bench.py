@@ -14,7 +14,9 @@ def add(commands: Commands) -> None:
         help="kernels: cost of steps, hulls, banks, a new process, as ratios in one run on one core; "
         "tightness: hulls beside the exact ones and the published estimators of a benchmark",
     )
-    parser.add_argument("files", nargs="*", metavar="FILE", help="tightness: JSON files of published benchmarks")
+    parser.add_argument(
+        "--benchmarks", nargs="+", default=[], metavar="FILE", help="tightness: JSON files of published benchmarks"
+    )
     parser.add_argument("--quick", action="store_true", help="few sizes and rounds: shows that it works, not how fast")
     parser.add_argument("--out", metavar="DIR", help="folder for the figure and the JSON file (needs matplotlib)")
     parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of tables")

@@ -1,4 +1,4 @@
-"""``lsu-mesh bench tightness FILE …``: hulls beside the exact ones and the published estimators."""
+"""``lsu-mesh bench tightness --benchmarks FILE …``: hulls beside the exact ones and the published estimators."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def main(options: argparse.Namespace) -> int:
     from lsu_mesh.errors import ModelError
     from lsu_mesh.experiments import tightness
 
-    if not options.files:
-        print("give the JSON files of the benchmarks: lsu-mesh bench tightness FILE …", file=sys.stderr)
+    if not options.benchmarks:
+        print("give the JSON files of the benchmarks: lsu-mesh bench tightness --benchmarks FILE …", file=sys.stderr)
         return USAGE
     try:
-        benchmarks = [tightness.read_benchmark(Path(name)) for name in options.files]
+        benchmarks = [tightness.read_benchmark(Path(name)) for name in options.benchmarks]
     except ModelError as error:
         print(error, file=sys.stderr)
         return USAGE

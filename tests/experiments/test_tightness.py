@@ -91,12 +91,17 @@ def test_a_hull_that_is_too_small_is_seen(interval: Path) -> None:
 
 
 def test_the_command_prints_own_filters_and_published_estimators(lsu_mesh_command: list[str], interval: Path) -> None:
-    done = subprocess.run([*lsu_mesh_command, "bench", "tightness", str(interval)], capture_output=True, text=True)
+    done = subprocess.run(
+        [*lsu_mesh_command, "bench", "tightness", "--benchmarks", str(interval)], capture_output=True, text=True
+    )
     assert done.returncode == 0
     assert "LSUCZ(20, 8)" in done.stdout
     assert "published: someone" in done.stdout
     printed = subprocess.run(
-        [*lsu_mesh_command, "bench", "tightness", "--json", str(interval)], capture_output=True, text=True, check=True
+        [*lsu_mesh_command, "bench", "tightness", "--json", "--benchmarks", str(interval)],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     report = json.loads(printed.stdout)
     assert {row["filter"] for row in report["own"]} == set(FILTERS)
