@@ -297,4 +297,5 @@ def test_exhaustive_edges_stay_few_with_many_inputs(unknown: bool) -> None:
         filter.predict(Orthotope(u - 1.0, u + 1.0) if unknown else u)
         reach = np.abs(model.A).sum(axis=1) + model.rho + (np.abs(model.B).sum(axis=1) if unknown else 0.0)
         assert (filter.bounds()[1] >= model.B @ u + reach - 1e-9).all()
-    assert filters[0].volume() == filters[1].volume() if unknown else filters[0].volume() < filters[1].volume()
+    exhaustive, greedy = (filter.volume() for filter in filters)
+    assert exhaustive == greedy if unknown else exhaustive <= greedy * (1 + 1e-9)
