@@ -118,5 +118,6 @@ def _window(structure: Structure, data: Record, first: Orthotope | None) -> Wind
     A, B = structure.known["A"], structure.known["B"]
     return WindowData(
         data.Y, data.U, np.zeros_like(data.U), np.broadcast_to(A, (N - 1, *A.shape)),
-        np.broadcast_to(B, (N - 1, *B.shape)), lower, upper, np.clip(np.zeros((N, n)), lower, upper), structure.start,
+        np.broadcast_to(B, (N - 1, *B.shape)), lower, upper, np.clip(np.zeros((N, n)), lower, upper),
+        structure.start, True,
     )  # fmt: skip

@@ -262,6 +262,7 @@ class WindowMAP(Filter):
                 np.vstack([data.U, center]), np.vstack([data.spread, spread]),
                 np.concatenate([data.A, own_A[None]]), np.concatenate([data.B, own_B[None]]),
                 np.vstack([data.lower, low]), np.vstack([data.upper, high]), np.vstack([data.X, x]), theta,
+                data.is_uniform and used is self._model,
             ),
             state.rho, state.r, np.vstack([state.smallest, none]), np.vstack([state.largest, none]),
             np.append(state.counts, 0),
@@ -277,7 +278,8 @@ class WindowMAP(Filter):
         lower, upper, Y = data.lower[1:].copy(), data.upper[1:].copy(), data.Y[1:].copy()
         lower[0], upper[0], Y[0] = low, high, np.nan
         return Window(
-            WindowData(Y, data.U[1:], data.spread[1:], data.A[1:], data.B[1:], lower, upper, data.X[1:], data.theta),
+            WindowData(Y, data.U[1:], data.spread[1:], data.A[1:], data.B[1:], lower, upper, data.X[1:], data.theta,
+                data.is_uniform),
             state.rho, state.r, state.smallest[1:], state.largest[1:], state.counts[1:], state.reach, state.solution,
         )  # fmt: skip
 
@@ -309,7 +311,7 @@ class WindowMAP(Filter):
         self._state = Window(
             WindowData(
                 np.full((1, m), np.nan), np.zeros((0, p)), np.zeros((0, p)), np.zeros((0, n, n)), np.zeros((0, n, p)),
-                low[None], high[None], middle[None], self._structure.start,
+                low[None], high[None], middle[None], self._structure.start, True,
             ),
             np.zeros(q), np.zeros(m), none, none, np.zeros(1, dtype=np.int64), 0.5 * (high - low), None,
         )  # fmt: skip

@@ -33,6 +33,10 @@ NO_LIMIT, IS_FIXED = -1.0, -2.0
 """What stands for a slack in ``Point.limits``."""
 BALANCED = 1e-9
 """Largest violation of the dual equations at the end, as a share of the cost."""
+FAR = 1e6
+"""Steps are polished from this multiple of the aim on."""
+NEAR = 1e4
+"""From this multiple of the aim on, the best point is kept."""
 PATIENCE = 5
 """After so many steps without a better point, rounding has the better of the method."""
 LEAST_PIVOT = 1e-15
@@ -400,12 +404,15 @@ def improve(
     for iteration in range(most):
         row_values(rows, point.z, count, work.values)
         total, terms = _gap(point, moved, 0.0, 0.0)
-        unbalanced = _imbalance(rows, limits, point, count, work)
         aim = share * abs(objective(limits, point.z)) + least
-        merit = max(total / aim, unbalanced / BALANCED, _violation(rows, point, work) / least)
+        merit = total / aim
+        if merit <= NEAR:
+            unbalanced = _imbalance(rows, limits, point, count, work)
+            merit = max(merit, unbalanced / BALANCED, _violation(rows, point, work) / least)
         if merit < best_merit:
             best_merit, best_iteration = merit, iteration
-            _copy(point, best)
+            if merit <= NEAR or iteration == 0:
+                _copy(point, best)
         if merit <= 1.0:
             return iteration
         if iteration - best_iteration > PATIENCE or not np.isfinite(total):
@@ -422,7 +429,7 @@ def improve(
         affine, _ = _gap(point, moved, primal, dual)
         sigma = min(max((affine / total) ** 3, 1e-6), 1.0)
         _aims(rows, limits, point, moved, sigma * total / terms, 1.0, work)
-        _solve(rows, limits, point, moved, count, system, work, 1)
+        _solve(rows, limits, point, moved, count, system, work, 1 if merit <= FAR else 0)
         primal, dual = _step_lengths(rows, point, moved, 1.0 / TO_BOUNDARY)
         _go(point, moved, TO_BOUNDARY * primal, TO_BOUNDARY * dual)
     _copy(best, point)

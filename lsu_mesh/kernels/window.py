@@ -29,6 +29,8 @@ MARGIN = 0.1
 """How far from its limits an unknown starts, as a share of their distance."""
 WIDE = 2.0
 """Half-widths start at so many times the largest residual."""
+THINNEST = 1e-10
+"""A state whose box is thinner than this share of the size of the data is fixed at its middle."""
 SHARE = 0.95
 """Share of a half-width's cost that its rows carry at the start; the rest goes to its limit."""
 GAP = 1e-8
@@ -85,6 +87,8 @@ def in_units_of(scale: float, rows: Rows, limits: Limits, count: int) -> tuple[R
         if i < count or i >= widths:
             lower[i] /= scale
             upper[i] /= scale
+        if i < count and upper[i] - lower[i] <= THINNEST:
+            lower[i] = upper[i] = 0.5 * (lower[i] + upper[i])
     return (
         Rows(
             rows.first, rows.span, rows.a, rows.g / scale, rows.d / scale, rows.width, rows.factor, rows.reach / scale

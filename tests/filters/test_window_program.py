@@ -59,7 +59,7 @@ def case(seed: int, N: int = 12, missing: float = 0.2, structure: Structure | No
         structure,
         WindowData(
             Y, U, np.zeros((N - 1, 2)), np.tile(known["A"], (N - 1, 1, 1)), np.tile(known["B"], (N - 1, 1, 1)),
-            -free, free, X + rng.normal(size=X.shape) * 0.1, theta,
+            -free, free, X + rng.normal(size=X.shape) * 0.1, theta, True,
         ),
     )  # fmt: skip
 
