@@ -149,12 +149,15 @@ class WindowMAP(Filter):
         """The last answer of the solver."""
         return self._state.solution
 
-    def interval_estimates(self, kappa: float | None = None) -> tuple[Matrix, Matrix]:
-        """Intervals (N, n) of all states in the window, eqs (29)–(31), met with their boxes; the oldest first."""
+    def interval_estimates(self, kappa: float | None = None, met: bool = True) -> tuple[Matrix, Matrix]:
+        """Intervals (N, n) of all states in the window, eqs (29)–(31); the oldest first, infinite where there is none.
+
+        ``met``: whether they are met with the states' boxes.
+        """
         state = self._state
         kappa = self._kappa if kappa is None else kappa
         lower, upper = interval_estimate(state.smallest, state.largest, state.counts, kappa)
-        return _met(lower, upper, state.data.lower, state.data.upper)
+        return _met(lower, upper, state.data.lower, state.data.upper) if met else (lower, upper)
 
     @property
     def support(self) -> Orthotope:

@@ -16,6 +16,10 @@ class Experiment(NamedTuple):
 
 
 REPRODUCIBLE = {
+    "p2006": Experiment("half-widths by linear programming, off-line and on a sliding window", ("p2006",)),
+    "p2014": Experiment(
+        "states, E, F and half-widths on a window; centred points, vertices, truncated Kalman filter", ("p2014",)
+    ),
     "l2019": Experiment("LSUO and LSUP on S1, S2, S3 over a grid of noises: 16 criteria, 26 figures", ("l2019",)),
     "fusion": Experiment(
         "three filters and their fusion on P3; Bayesian transfer against the source's noise", ("fusion", "transfer")
