@@ -79,7 +79,8 @@ def _verdict(paper: float, here: Spread, trend: bool | None, why: str) -> str:
     distance = abs(here.mean - paper)
     if distance <= max(DEVIATIONS * here.sd, SHARE * abs(paper)):
         return REPRODUCED
-    size = f"{here.mean / paper:.2g} × the paper's" if paper else f"{here.mean:.2g} instead of 0"
+    ratio = here.mean / paper if paper else 0.0
+    size = f"{ratio:.2g} × the paper's" if 1e-3 < ratio < 1e3 else f"{here.mean:.2g} instead of {paper:g}"
     return _with(SAME_TREND if trend else NOT_REPRODUCED, f"{size}; {why}" if why else size)
 
 

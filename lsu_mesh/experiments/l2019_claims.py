@@ -3,36 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh.experiments.comparison import Row, ours, stated, trend_stated
+from lsu_mesh.experiments.effect import Effect
 from lsu_mesh.experiments.l2019_criteria import SETTLED, TRANSIENT, WITHOUT_INPUT
 from lsu_mesh.experiments.l2019_overlap import SIGNED
 from lsu_mesh.experiments.l2019_surfaces import Surfaces
 from lsu_mesh.experiments.outcome import Spread
 
-Matrix = NDArray[np.float64]
 LOSSES = "a guaranteed filter loses nothing; losses come from widening by rho where abs(M A⁻¹) rho is meant"
 GROWS = 1.05
 """Factor between the ends of the grid from which something grows."""
-
-
-class Effect(NamedTuple):
-    """Factors by which a criterion grows from the lowest to the highest noise, geometric means over the other noise."""
-
-    rho: float
-    r: float
-
-    @classmethod
-    def of(cls, values: Matrix) -> Effect:
-        logs = np.log(values)
-        return cls(float(np.exp((logs[-1] - logs[0]).mean())), float(np.exp((logs[:, -1] - logs[:, 0]).mean())))
-
-    def __str__(self) -> str:
-        return f"× {self.rho:.3g} by ρ, × {self.r:.3g} by r"
 
 
 def claims(surfaces: Surfaces) -> list[Row]:

@@ -65,8 +65,8 @@ def draw(surfaces: Surfaces, plan: Plan) -> Figure:
         axes = figure.add_subplot(1, 2, i + 1, projection="3d")
         values = surfaces.of(plan.system, name)
         axes.plot_surface(rho, r, values, cmap="viridis", edgecolor="#404040", linewidth=0.3, antialiased=True)
-        if np.ptp(values) == 0.0:
-            axes.set_zlim(values[0, 0] - 1.0, values[0, 0] + 1.0)
+        if np.ptp(values) == 0.0:  # a share, of nothing or of all
+            axes.set_zlim(*((99.0, 101.0) if values[0, 0] else (0.0, 1.0)))
         axes.set_xlabel("ρ", fontsize=9)
         axes.set_ylabel("r", fontsize=9)
         axes.set_title(f"{plan.system}: {name}\n{MEANING[name]}", fontsize=9)

@@ -137,6 +137,11 @@ class Check(NamedTuple):
         return f"{verdict}: {self.what} = {self.measured:.4g} ({self.sense} {self.limit:.4g})"
 
 
+def between(what: str, measured: float, low: float, high: float) -> list[Check]:
+    """Both checks of a number that should lie in [low, high]."""
+    return [Check(what, measured, low, "at least"), Check(what, measured, high)]
+
+
 class Outcome(NamedTuple):
     """Tables, checks, and figures by the stem of their file; a figure is drawn when its function is called.
 

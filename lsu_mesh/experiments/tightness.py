@@ -3,7 +3,8 @@
 A benchmark is a JSON file: ``system`` with matrices A, B, C, zonotopes R0 (of x at the first row), W and V (``center``,
 ``generators``), columns ``y`` and ``u`` of outputs and inputs; ``exact_hulls`` with ``lo`` and ``hi`` of some rows;
 ``tightness`` with the row ``k`` at which the mean over the states of radius ÷ exact radius is compared, and the
-``mean_ratio`` of each published estimator. The source of the numbers stands in the file.
+``mean_ratio`` of each published estimator; where they are known, the published hulls of that row, ``cora_hulls.full``.
+The source of the numbers stands in the file.
 """
 
 from __future__ import annotations
@@ -47,7 +48,10 @@ MOST_UNREDUCED = 100
 
 
 class Benchmark(NamedTuple):
-    """Model, prior, outputs Y (T, m), inputs U (T, p), exact hulls by row, and what is published of row ``last``."""
+    """Model, prior, outputs Y (T, m), inputs U (T, p), exact hulls by row, and what is published of row ``last``.
+
+    ``published``: mean ratios by estimator; ``published_hulls``: (lower, upper) by estimator, where they are known.
+    """
 
     name: str
     model: LSUModel
@@ -57,6 +61,8 @@ class Benchmark(NamedTuple):
     exact: dict[int, tuple[Vector, Vector]]
     last: int
     published: dict[str, float]
+    published_hulls: dict[str, tuple[Vector, Vector]]
+    source: str
 
 
 class Tightness(NamedTuple):
@@ -86,9 +92,11 @@ def read_benchmark(path: Path) -> Benchmark:
             prior=Orthotope(center - reach, center + reach),
             Y=np.array(system["y"], dtype=np.float64).T,
             U=np.array(system["u"], dtype=np.float64).T,
-            exact={int(k): (np.array(hull["lo"]), np.array(hull["hi"])) for k, hull in data["exact_hulls"].items()},
+            exact={int(k): _hull(hull) for k, hull in data["exact_hulls"].items()},
             last=int(tightness["k"]),
             published={name: float(entry["mean_ratio"]) for name, entry in tightness["estimators"].items()},
+            published_hulls={name: _hull(hull) for name, hull in data.get("cora_hulls", {}).get("full", {}).items()},
+            source=str(data.get("source", "")),
         )
     except OSError as error:
         raise ModelError(f"{path}: {error.strerror}") from error
@@ -98,12 +106,17 @@ def read_benchmark(path: Path) -> Benchmark:
         raise ModelError(f"{path} is no benchmark: {error!r} (see lsu_mesh/experiments/tightness.py)") from error
 
 
+def _hull(hull: dict[str, Any]) -> tuple[Vector, Vector]:
+    return np.array(hull["lo"], dtype=np.float64), np.array(hull["hi"], dtype=np.float64)
+
+
 def measure(benchmark: Benchmark, filters: dict[str, Callable[[LSUModel, Orthotope], Filter]]) -> list[Tightness]:
     """Every filter that fits on the data of one benchmark."""
-    return [_follow(benchmark, name, make) for name, make in filters.items() if _fits(name, benchmark)]
+    return [_follow(benchmark, name, make) for name, make in filters.items() if fits(name, benchmark)]
 
 
-def _fits(name: str, benchmark: Benchmark) -> bool:
+def fits(name: str, benchmark: Benchmark) -> bool:
+    """Whether a filter of ``FILTERS`` can be run on a benchmark in little time."""
     if "unreduced" in name:
         return benchmark.last < MOST_UNREDUCED
     return "edges" not in name or max(benchmark.model.state_count, benchmark.model.rho.size) <= LARGEST_EXHAUSTIVE

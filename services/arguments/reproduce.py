@@ -20,10 +20,13 @@ REPRODUCIBLE = {
     "p2014": Experiment(
         "states, E, F and half-widths on a window; centred points, vertices, truncated Kalman filter", ("p2014",)
     ),
+    "p2018": Experiment("LSUO beside the zonotopic Kalman filter on P3: Table 1, Figures 1–3", ("p2018",)),
     "l2019": Experiment("LSUO and LSUP on S1, S2, S3 over a grid of noises: 16 criteria, 26 figures", ("l2019",)),
+    "p2023": Experiment("LSUCZ beside LSUO and LSUP over the observation noise: Tables 1, 2, Figures 1–3", ("p2023",)),
     "fusion": Experiment(
         "three filters and their fusion on P3; Bayesian transfer against the source's noise", ("fusion", "transfer")
     ),
+    "cora": Experiment("published benchmark systems: our filters beside published estimators", ("cora",)),
 }
 """In the order of ``reproduce all`` and of its page."""
 ALL = "all"
