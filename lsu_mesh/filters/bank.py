@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.filters.arguments import kernel_model
+from lsu_mesh.filters.arguments import checked_prior, kernel_model
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.run import FilterRun
 from lsu_mesh.kernels import loops
@@ -66,7 +66,7 @@ class FilterBank:
         self.kind = kind
         self._filter = first
         self._models = _stack(model_list)
-        self._states = np.array([kind._enclose(prior) for prior in prior_list])
+        self._states = np.array([kind._enclose(checked_prior(model_list[0], prior)) for prior in prior_list])
         if len(self._states) != count:
             self._states = np.repeat(self._states, count, axis=0)
         self._threads = max(1, min(threads or os.cpu_count() or 1, count // SMALLEST_SHARE))

@@ -162,7 +162,7 @@ class ConstrainedZonotope(Support):
         return is_proved_empty(self._A, self._b)
 
     def volume(self) -> float:
-        """Volume of the exact polytope up to dimension 6 (and 6 000 vertices), else of the interval hull above it."""
+        """Volume of the exact polytope up to dimension 6; of the interval hull beyond it, or with too many faces."""
         if self.is_empty():
             return 0.0
         exact = self._polytope().volume if self.dim <= LARGEST_EXACT_VOLUME else math.nan

@@ -177,6 +177,8 @@ def test_one_contradiction_does_not_stop_a_bank() -> None:
 def test_banks_say_what_does_not_fit() -> None:
     with pytest.raises(ModelError, match="3 models and 2 priors"):
         FilterBank(LSUO, [MODEL] * 3, [PRIOR] * 2)
+    with pytest.raises(ModelError, match="3 coordinates, one per state, it has 2"):
+        FilterBank(LSUO, systems.get("P3"), [Orthotope([0.0] * 3, [1.0] * 3), Orthotope([0.0] * 2, [1.0] * 2)])
     with pytest.raises(ModelError, match="equal shapes"):
         FilterBank(LSUO, [MODEL, systems.get("S1")], PRIOR)
     with pytest.raises(ModelError, match="no compiled bank"):

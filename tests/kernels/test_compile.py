@@ -29,3 +29,27 @@ def test_kernels_work_where_no_cache_can_be_written(tmp_path: Path) -> None:
     program = "from lsu_mesh.kernels.rounding import up; assert up(1.0) > 1.0"
     environment = {"NUMBA_CACHE_DIR": "/proc/nowhere", "HOME": "/proc/nowhere", "PATH": "/usr/bin"}
     subprocess.run([sys.executable, "-c", program], env=environment, check=True, cwd=tmp_path)
+
+
+@pytest.mark.parametrize(("folder", "before"), [("cache", True), ("/proc/nowhere", False)])
+def test_a_kernel_awaits_compilation_until_it_is_in_the_cache(tmp_path: Path, folder: str, before: bool) -> None:
+    """One that cannot be cached awaits nothing: compiling it in another process would be in vain."""
+    program = (
+        "from lsu_mesh.kernels.rounding import up; from lsu_mesh.kernels.compile import awaits_compilation as awaits; "
+        f"assert awaits(up) is {before}; up(1.0); assert not awaits(up)"
+    )
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / folder), "HOME": "/proc/nowhere", "PATH": "/usr/bin"}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True, cwd=Path(__file__).parents[2])
+
+
+def test_a_first_kernel_does_not_load_linear_algebra_of_scipy_and_numba_still_finds_it() -> None:
+    program = """
+import sys
+from lsu_mesh.kernels.rounding import up
+assert up(1.0) > 1.0
+assert "scipy.linalg" not in sys.modules
+import numba, numpy
+assert numba.njit(lambda a: numpy.dot(a, a))(numpy.full(3, 2.0)) == 12.0
+assert "scipy.linalg" in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(__file__).parents[2])
