@@ -66,9 +66,10 @@ class RunReport:
         """Take a payload as it came."""
         message = self._gate.admit(key, payload)
         if message is not None:
-            self._note(message, arrival_ns)
+            self.note(message, arrival_ns)
 
-    def _note(self, message: Message, arrival_ns: int) -> None:
+    def note(self, message: Message, arrival_ns: int) -> None:
+        """Take a message that was let through before."""
         if isinstance(message, Truth):
             self._truth[message.step] = message.x
             for track in self.tracks.values():

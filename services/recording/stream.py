@@ -106,13 +106,14 @@ def run_description(configuration: Configuration) -> dict[str, str]:
     return {
         "configuration": _text(configuration.path),
         "configuration_path": str(configuration.path),
+        "settings": json.dumps(configuration.values),
         "mesh": configuration.mesh.name,
         "model": json.dumps(matrices),
         "model_digest": configuration.digest(),
         "seed": str(configuration.mesh.seed),
         "dt": repr(configuration.mesh.dt),
         "python": platform.python_version(),
-        "cpu": _cpu(),
+        "cpu": processor(),
         "platform": f"{sys.platform} {platform.machine()}",
         "numba_cpu_name": os.environ.get("NUMBA_CPU_NAME", ""),
     } | {package.replace("-", "_"): _version(package) for package in PACKAGES}
@@ -143,7 +144,8 @@ def _text(path: Path) -> str:
         return f"not readable when the recording began: {error}"
 
 
-def _cpu() -> str:
+def processor() -> str:
+    """Name of the processor for which the kernels are compiled."""
     from llvmlite import binding  # numba's own name of the target, which decides what its kernels are compiled to
 
     return str(binding.get_host_cpu_name())

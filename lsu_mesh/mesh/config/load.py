@@ -5,8 +5,10 @@ Precedence: flag (``-X table.key=value``) > environment (``LSU_MESH_TABLE__KEY``
 
 from __future__ import annotations
 
+import copy
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,16 +27,22 @@ from lsu_mesh.mesh.keys import NAME_RULE, is_name
 ENVIRONMENT_PREFIX = "LSU_MESH_"
 
 
-def load(path: Path, overrides: Sequence[str] = (), environment: Mapping[str, str] | None = None) -> Configuration:
-    """Read and check a configuration.
+def load(
+    path: Path,
+    overrides: Sequence[str] = (),
+    environment: Mapping[str, str] | None = None,
+    *,
+    reads_files: bool = True,
+) -> Configuration:
+    """Read and check a configuration; files of measurements are looked into only if ``reads_files``.
 
     Raises
     ------
     ConfigurationError
         With one line per mistake: file, table, key, what was expected, the nearest valid name.
     """
-    configuration, _ = load_with_keys(path, overrides, environment)
-    return configuration
+    problems = Problems(str(path), reads_files=reads_files)
+    return _load(path, overrides, environment, problems)
 
 
 def load_with_keys(
@@ -42,13 +50,37 @@ def load_with_keys(
 ) -> tuple[Configuration, set[str]]:
     """The configuration and the paths of all keys that the schema knows for it."""
     problems = Problems(str(path))
+    return _load(path, overrides, environment, problems), problems.asked
+
+
+def _load(
+    path: Path, overrides: Sequence[str], environment: Mapping[str, str] | None, problems: Problems
+) -> Configuration:
     values = _read_toml(path)
     _apply(values, _from_environment(environment or {}), "environment", problems)
     _apply(values, [_split(text) for text in overrides], "-X", problems)
+    return _checked(values, path, problems)
+
+
+def load_values(
+    values: Mapping[str, Any], path: Path, overrides: Sequence[str] = (), *, reads_files: bool = True
+) -> Configuration:
+    """A configuration from the TOML values themselves, as :attr:`Configuration.values` holds them.
+
+    ``path`` stands in messages, and paths in the values start from its folder. Files of measurements are looked into
+    only if ``reads_files``: those of a recorded run may be gone. Raises :class:`ConfigurationError`.
+    """
+    problems, copied = Problems(str(path), reads_files=reads_files), copy.deepcopy(dict(values))
+    _apply(copied, [_split(text) for text in overrides], "-X", problems)
+    return _checked(copied, path, problems)
+
+
+def _checked(values: dict[str, Any], path: Path, problems: Problems) -> Configuration:
+    original = copy.deepcopy(values)
     configuration = _read(values, path, problems)
     problems.raise_if_any()
     assert configuration is not None
-    return configuration, problems.asked
+    return replace(configuration, values=original)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:

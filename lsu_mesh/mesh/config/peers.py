@@ -112,6 +112,8 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
         columns = None
     path = file_at(text, folder)
     settings = MeasurementFileSettings(path, tuple(columns or ()), index, indexed_by)
+    if not table.problems.reads_files:
+        return settings
     try:
         header = read_columns(settings, default_count=count).columns
     except FileProblems as error:

@@ -166,6 +166,8 @@ class Configuration:
     supervisor: SupervisorSettings = field(default_factory=SupervisorSettings)
     warnings: tuple[str, ...] = ()
     """What is legal and yet probably not meant."""
+    values: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    """The TOML values that all of this was read from, flags and environment included."""
 
     def model(self, sensors: Iterable[str]) -> LSUModel:
         """The model whose rows of C are those of the named sensors, in the order of their names."""

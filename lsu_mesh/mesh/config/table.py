@@ -28,8 +28,10 @@ class ConfigurationError(LsuMeshError):
 class Problems:
     """The mistakes found so far, each with file and place, and the keys that were asked for."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, *, reads_files: bool = True) -> None:
         self.file = file
+        self.reads_files = reads_files
+        """Whether files of measurements are looked into; of a recorded configuration they may be gone."""
         self.lines: list[str] = []
         self.asked: set[str] = set()
 
