@@ -71,7 +71,7 @@ def _cells(row: Row) -> list[str]:
     return [
         str(row.steps),
         _shown(row.rmse, ".4f"),
-        _share(row.inside),
+        share(row.inside),
         _shown(row.width, ".4f"),
         _shown(row.latency_p50_ms, ".2f", " ms"),
         _shown(row.latency_p99_ms, ".2f", " ms"),
@@ -85,8 +85,8 @@ def _shown(value: float | None, form: str, unit: str = "") -> str:
     return "–" if value is None else f"{value:{form}}{unit}"
 
 
-def _share(inside: float | None) -> str:
-    """100 % only where it is exactly that."""
+def share(inside: float | None) -> str:
+    """A share in percent, 100 % only where it is exactly that."""
     if inside is None:
         return "–"
     return "100 %" if inside == 1.0 else f"{min(inside * 100, 99.99):.2f} %"

@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
@@ -30,6 +31,23 @@ QUIET_S = 4.0
 """The run is over when the sources have ended and nothing new has come for so long."""
 
 
+class Player(Protocol):
+    """Publishes recorded messages in the place of plant and sensors."""
+
+    def announce(self, bus: Bus) -> None:
+        """Declare the keys, so that subscribers know them before the first message."""
+
+    def begin(self, now: int) -> None:
+        """Let the recorded time begin."""
+
+    def play(self, bus: Bus, report: RunReport, now: int, patience: float) -> float:
+        """Publish what is due; returns for how long there is nothing to do, ``patience`` seconds at most."""
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether everything was published."""
+
+
 @dataclass
 class Run:
     """One run of a mesh under the supervisor."""
@@ -42,6 +60,8 @@ class Run:
     stop: Stop
     report: RunReport
     recording: Path | None
+    player: Player | None = None
+    """Publishes what plant and sensors published in a recording, in their place."""
     alive: set[str] = field(default_factory=set)
     happened: list[str] = field(default_factory=list)
     began: float = field(default_factory=time.monotonic)
@@ -52,7 +72,9 @@ class Run:
         self.happened.append(f"{time.monotonic() - self.began:7.2f} s  {words}")
 
     def turn(self, timeout: float = 0.05) -> None:
-        """Take what has come and look after the children."""
+        """Take what has come, publish what is due, and look after the children."""
+        if self.player is not None:
+            timeout = self.player.play(self.bus, self.report, self.clock.now(), timeout)
         arrival = self.bus.next(timeout)
         while arrival is not None:
             self._take(arrival)
@@ -82,6 +104,11 @@ def main(options: argparse.Namespace) -> int:
     if configuration is None:
         return USAGE
     print_warnings(configuration)
+    return run_mesh(configuration, options)
+
+
+def run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None = None) -> int:
+    """Run the mesh of a configuration, with a recording in the place of its sources where there is one."""
     stop: Stop = options.stop
     clock = Clock()
     try:
@@ -89,7 +116,8 @@ def main(options: argparse.Namespace) -> int:
         with Bus(settings, clock) as bus:
             recording = None if options.no_record else _recording_path(configuration, options)
             supervisor = Supervisor(configuration.supervisor)
-            run = Run(configuration, options, supervisor, bus, clock, stop, RunReport(configuration), recording)
+            report = RunReport(configuration)
+            run = Run(configuration, options, supervisor, bus, clock, stop, report, recording, player)
             return _supervise(run)
     except InsecureSession as error:
         print(f"run: {error}", file=sys.stderr)
@@ -122,6 +150,8 @@ def _supervise(run: Run) -> int:
     for topic in ("truth", "posterior", "fused", "health", "event"):
         run.bus.subscribe(f"{PREFIX}/{run.configuration.mesh.name}/{topic}/*")
     run.bus.watch_alive(key(run.configuration.mesh.name, "live", "*"))
+    if run.player is not None:
+        run.player.announce(run.bus)
     try:
         _announce(run)
         code = _start(run)
@@ -145,7 +175,8 @@ def _announce(run: Run) -> None:
     last = _last_step(run.configuration)
     length = "until stopped" if last is None else f"{last} steps"
     where = "not recorded" if run.recording is None else f"recorded in {run.recording}"
-    count = len(run.configuration.peers()) - (run.recording is None)
+    played = 0 if run.player is None else sum(role in ("plant", "sensor") for role, _ in run.configuration.peers())
+    count = len(run.configuration.peers()) - (run.recording is None) - played
     print(f"mesh {mesh.name!r}: {count} peers, {length} at {mesh.rate:g} Hz, {where}", file=sys.stderr)
 
 
@@ -158,6 +189,8 @@ def _start(run: Run) -> int:
         if role == "recorder" and run.recording is None:
             continue
         is_source = _is_source(run.configuration, role, name)
+        if run.player is not None and role in ("plant", "sensor"):
+            continue
         child = run.supervisor.start(role, name, _arguments(run, role), held=is_source)
         names.add(name)
         if is_source:
@@ -165,6 +198,8 @@ def _start(run: Run) -> int:
     if not _await_mesh(run, names):
         return COULD_NOT_START
     begin = run.clock.now() + int(START_LEAD_S * 1e9)
+    if run.player is not None:
+        run.player.begin(begin)
     for child in held:
         run.supervisor.tell(child, str(begin))
     return OK
@@ -236,6 +271,8 @@ def _follow(run: Run) -> None:
 
 
 def _sources_ended(run: Run, last: int | None) -> bool:
+    if run.player is not None:
+        return run.player.is_finished
     steps = run.report.source_steps
     return last is not None and bool(steps) and max(steps.values()) >= last
 

@@ -79,10 +79,14 @@ def _estimate(
     return row
 
 
-def write_playable(recording: Recording, folder: Path) -> list[Path]:
-    """Measurements and inputs as CSV files, and a configuration that plays them; the first of a step counts."""
-    configuration = recording.configuration
+def write_playable(recording: Recording, folder: Path, replayed: Configuration | None = None) -> list[Path]:
+    """Measurements and inputs as CSV files, and a configuration that plays them; the first of a step counts.
+
+    ``replayed`` is the configuration whose filters and fusions are to run; default: the recorded one.
+    """
+    configuration = replayed or recording.configuration
     values = copy.deepcopy(dict(configuration.values))
+    values.pop("network", None)  # where the recorded mesh was is no place for another one
     measured: dict[str, dict[int, Measurement]] = {}
     inputs: dict[int, Input] = {}
     for message in (one.message for one in recording.received):
@@ -92,16 +96,21 @@ def write_playable(recording: Recording, folder: Path) -> list[Path]:
             inputs.setdefault(message.step, message)
     files = []
     for name, by_step in sorted(measured.items()):
-        labels = [output.part for output in outputs_of(configuration.sensors[name])]
-        rows = ({"step": k, "time": m.time_ns * 1e-9, **dict(zip(labels, m.y, strict=True))} for k, m in by_step.items())
-        files.append(_write_csv(sorted(rows, key=lambda row: row["step"]), folder / MEASUREMENTS / f"{name}.csv"))
+        if name not in configuration.sensors:
+            continue
+        parts = tuple(output.part for output in outputs_of(configuration.sensors[name]))
+        labels = [f"output {part}" if part in ("step", "time") else part for part in parts]
+        ordered = sorted(by_step.items())
+        rows = [{"step": k, "time": m.time_ns * 1e-9, **dict(zip(labels, m.y, strict=True))} for k, m in ordered]
+        files.append(_write_csv(rows, folder / MEASUREMENTS / f"{name}.csv"))
         kept = {key: value for key, value in values["sensors"][name].items() if key in ("C", "r", "outputs")}
         played = {"file": f"{MEASUREMENTS}/{name}.csv", "step": "step", "columns": labels}
         values["sensors"][name] = kept | played
     if inputs:
-        labels = list(told_apart(configuration.base_model.inputs))
-        rows = ({"step": k, **dict(zip(labels, inputs[k].u, strict=True))} for k in sorted(inputs))
-        files.append(_write_csv(list(rows), folder / INPUTS))
+        parts = told_apart(configuration.base_model.inputs)
+        labels = [f"input {part}" if part == "step" else part for part in parts]
+        rows = [{"step": k, **dict(zip(labels, inputs[k].u, strict=True))} for k in sorted(inputs)]
+        files.append(_write_csv(rows, folder / INPUTS))
         plant = {key: value for key, value in values.get("plant", {}).items() if key in ("name", "x1")}
         values["plant"] = plant | {"file": INPUTS, "step": "step", "columns": labels}
     text = folder / "mesh.toml"

@@ -21,6 +21,7 @@ from services.commands.configuration import print_problems
 from services.recording.read import Received, Recording
 from services.replay.compare import CannotReplay, beside
 from services.report import Row, RunReport
+from services.table import share
 
 
 def replay_again(recording: Recording, options: argparse.Namespace) -> int:
@@ -48,7 +49,12 @@ def replay_again(recording: Recording, options: argparse.Namespace) -> int:
 
 def is_comparison(options: argparse.Namespace) -> bool:
     """Whether other filters run on the recorded data."""
-    return options.other is not None or bool(options.overrides)
+    return options.other is not None or bool(model_changes(options))
+
+
+def model_changes(options: argparse.Namespace) -> list[str]:
+    """The flags that change what is computed, and not where the mesh is."""
+    return [change for change in options.overrides if not change.startswith("network.")]
 
 
 def configurations(recording: Recording, options: argparse.Namespace) -> tuple[Configuration, Configuration]:
@@ -60,9 +66,9 @@ def configurations(recording: Recording, options: argparse.Namespace) -> tuple[C
     if not is_comparison(options):
         return old, old
     if options.other is None:
-        other = load_values(old.values, old.path, options.overrides, reads_files=False)
+        other = load_values(old.values, old.path, model_changes(options), reads_files=False)
     else:
-        other = load(Path(options.other), options.overrides, os.environ, reads_files=False)
+        other = load(Path(options.other), model_changes(options), os.environ, reads_files=False)
     return beside(old, other)
 
 
@@ -158,9 +164,7 @@ def _print_table(rows: Sequence[tuple[str, Row]]) -> None:
         table.add_column(title, justify="right")
     for what, row in rows:
         rmse = "–" if row.rmse is None else f"{row.rmse:.4f}"
-        inside = (
-            "–" if row.inside is None else "100 %" if row.inside == 1.0 else f"{min(row.inside * 100, 99.99):.2f} %"
-        )
+        inside = share(row.inside)
         width = "–" if row.width is None else f"{row.width:.4f}"
         table.add_row(what, row.name, row.kind, str(row.steps), rmse, inside, width, str(row.inconsistent))
     console.print(table)

@@ -75,9 +75,7 @@ def _verdict(report: Report) -> list[str]:
     if report.recording.damaged:
         lines.append(f"{len(report.recording.damaged)} payload(s) are damaged, first: {report.recording.damaged[0]}")
     if found.differences:
-        lines += [
-            f"{len(found.differences)} of {total} sets differ from what their provenance gives; first difference:"
-        ]
+        lines.append(f"{len(found.differences)} of {total} sets differ from what their provenance gives; the first:")
         lines += [f"  {found.differences[0]}", *_other_machine(report)]
     elif found.exact:
         lines.append(f"{total} sets recomputed from their provenance in {report.seconds:.1f} s: equal, bit by bit")

@@ -27,7 +27,7 @@ def _lines(table: Mapping[str, Any], path: str) -> list[str]:
 
 
 def _key(text: str) -> str:
-    return text if BARE.fullmatch(text) else json.dumps(text)
+    return text if BARE.fullmatch(text) else _text(text)
 
 
 def _value(value: Any) -> str:
@@ -37,6 +37,12 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, float) and not math.isfinite(value):
         return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
-    if isinstance(value, bool | int | float | str):
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, bool | int | float):
         return json.dumps(value)
     raise TypeError(f"no TOML for {type(value).__name__} {value!r}")
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # the rest is escaped as in JSON

@@ -154,7 +154,8 @@ def test_another_mesh_that_does_not_fit_is_an_error(
 def test_the_options_of_a_run_are_in_its_recording(mesh: LocalMesh, recording: Path, demo: Path) -> None:
     found = read_recording(recording).configuration
     assert found.mesh.steps == 60
-    assert found == load(demo, ["mesh.steps=60"])
+    expected = load(demo, ["mesh.steps=60"])
+    assert (found.values, found.mesh, found.filters) == (expected.values, expected.mesh, expected.filters)
 
 
 def test_real_data_are_verified_without_their_file(run: Run, tmp_path: Path) -> None:
