@@ -128,6 +128,11 @@ class CompiledFilter(Filter):
     def reset(self, support: Support) -> None:
         self._state = self._enclose(checked_prior(self._model, support))
 
+    @property
+    def is_resumable(self) -> bool:
+        """Support and bounds tell the whole state."""
+        return True
+
     def snapshot(self) -> object:
         return self._state
 

@@ -97,7 +97,7 @@ class Filter(ABC):
     @property
     def is_resumable(self) -> bool:
         """Whether support and bounds are all that later sets depend on."""
-        return True
+        return False
 
     @abstractmethod
     def snapshot(self) -> object:

@@ -212,6 +212,11 @@ class LSUCZ(Filter):
         body = checked_prior(self._model, support).to_constrained_zonotope().arrays
         self._hold(Held(body, lower, upper, is_hull=True))
 
+    @property
+    def is_resumable(self) -> bool:
+        """The set and the box are all that is held."""
+        return True
+
     def snapshot(self) -> Held:
         """The set and the box; neither is ever written again."""
         return self._held

@@ -61,12 +61,14 @@ def test_the_demo(mesh_of: MakeMesh) -> None:
     assert not found.containment.excused
 
 
-@pytest.mark.parametrize("kind", ["LSUPB", "ZonotopicKalman", "predictor form", "nearest point"])
+@pytest.mark.parametrize("kind", ["LSUPB", "ZonotopicKalman", "predictor form", "nearest point", "WindowMAP", "Kalman"])
 def test_every_kind_of_filter_with_data_missing(mesh_of: MakeMesh, kind: str) -> None:
     options = {
         "LSUPB": ['filters.box.kind="LSUPB"', 'filters.para.kind="LSUPB"'],
         "ZonotopicKalman": ['filters.box.kind="ZonotopicKalman"'],
         "predictor form": ['filters.box.kind="ZonotopicKalman"', 'filters.box.form="predictor"'],
+        "WindowMAP": ['filters.box.kind="WindowMAP"', "filters.box.window=5"],
+        "Kalman": ['filters.box.kind="Kalman"', 'filters.para.kind="TruncatedKalman"'],
         "nearest point": ['filters.cz.point="nearest"'],
     }[kind]
     mesh = mesh_of("mesh.steps=80", *options, carry=lossy(1))
