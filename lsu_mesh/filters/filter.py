@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
 Vector = NDArray[np.float64]
+Guarantee = Literal["declared", "learned", "none"]
 
 
 class OutputPrediction(NamedTuple):
@@ -31,7 +32,7 @@ class Filter(ABC):
     """
 
     kind: ClassVar[str]
-    guarantee: ClassVar[str] = "declared"
+    guarantee: ClassVar[Guarantee] = "declared"
     """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates."""
 
     @property

@@ -16,7 +16,7 @@ from lsu_mesh.filters.arguments import (
     output_vector,
     same_states,
 )
-from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
 from lsu_mesh.filters.gain import hull_gain
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -58,7 +58,7 @@ class Kalman(Filter):
     """
 
     kind: ClassVar[str] = "Kalman"
-    guarantee: ClassVar[str] = "none"
+    guarantee: ClassVar[Guarantee] = "none"
     _held: Gaussian
 
     def __init__(

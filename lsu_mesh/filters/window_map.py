@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.arguments import checked_prior, input_interval, output_vector, same_states
-from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
 from lsu_mesh.filters.gain import hull_gain
 from lsu_mesh.filters.interval_estimate import interval_estimate
 from lsu_mesh.filters.window_program import HalfWidths, Selected, WindowData, WindowProgram, WindowSolution
@@ -79,7 +79,7 @@ class WindowMAP(Filter):
     """
 
     kind: ClassVar[str] = "WindowMAP"
-    guarantee: ClassVar[str] = "none"
+    guarantee: ClassVar[Guarantee] = "none"
     _state: Window
 
     def __init__(

@@ -121,7 +121,7 @@ class Estimator(Node):
         self._counts: dict[str, float] = {
             "late": 0, "rewinds": 0, "contradictions": 0, "behind": 0, "resets": 0,
         }  # fmt: skip
-        self.guarantee: Guarantee = "declared"
+        self.guarantee: Guarantee = engine.guarantee
         """The weakest guarantee among all that the set descends from."""
         self._remarks: list[Message] = []
         """Events of a time update."""
@@ -458,7 +458,7 @@ class Estimator(Node):
 
     def start_from(self, base: Base, used: Sequence[Reference] = ()) -> None:
         """Note that the engine now holds a set made from ``base`` and ``used`` alone."""
-        self.guarantee, self.unsound = "declared", ""
+        self.guarantee, self.unsound = self.engine.guarantee, ""
         self._base, self._used, self._restarted = base, tuple(used), True
         self._never_rewind()
 

@@ -68,12 +68,14 @@ def test_every_kind_of_filter_with_data_missing(mesh_of: MakeMesh, kind: str) ->
         "ZonotopicKalman": ['filters.box.kind="ZonotopicKalman"'],
         "predictor form": ['filters.box.kind="ZonotopicKalman"', 'filters.box.form="predictor"'],
         "WindowMAP": ['filters.box.kind="WindowMAP"', "filters.box.window=5"],
-        "Kalman": ['filters.box.kind="Kalman"', 'filters.para.kind="TruncatedKalman"'],
+        "Kalman": ['filters.box.kind="Kalman"', 'filters.para.kind="TruncatedKalman"', *DOMAIN],
         "nearest point": ['filters.cz.point="nearest"'],
     }[kind]
-    mesh = mesh_of("mesh.steps=80", *options, carry=lossy(1))
-    mesh.run(2.5)
+    mesh = mesh_of("mesh.steps=60", *options, carry=lossy(1))
+    mesh.run(2.0)
     check(mesh)
+    is_estimate = kind in ("WindowMAP", "Kalman")
+    assert {message.guarantee for message in mesh.posteriors("box")} == {"none" if is_estimate else "declared"}
 
 
 @pytest.mark.parametrize("way", ["predictor", "fused"])
