@@ -12,7 +12,7 @@ from lsu_mesh.kernels.window import checked, in_units_of
 Vector = NDArray[np.float64]
 Indices = NDArray[np.int64]
 INFEASIBLE = 2
-TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+TOLERANCES: dict[str, float] = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 
 
 def highs_answer(
@@ -26,10 +26,11 @@ def highs_answer(
 
     scaled_rows, scaled = in_units_of(size, rows, limits, count)
     matrix, right, used = inequalities(scaled_rows, scaled, count)
-    answer = linprog(
-        scaled.cost, A_ub=matrix, b_ub=right, bounds=np.stack([scaled.lower, scaled.upper], axis=1),
-        method=method, options=TOLERANCES,
-    )  # fmt: skip
+    bounds = np.stack([scaled.lower, scaled.upper], axis=1)
+    for way, options in ((method, TOLERANCES), (method, {}), ("highs-ipm", {})):
+        answer = linprog(scaled.cost, A_ub=matrix, b_ub=right, bounds=bounds, method=way, options=options)
+        if answer.status == 0:
+            break
     if answer.status == INFEASIBLE:
         raise InconsistentData("no half-widths within their limits explain the data of the window")
     if answer.x is None:

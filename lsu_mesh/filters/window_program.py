@@ -83,7 +83,8 @@ class WindowSolution(NamedTuple):
 class HalfWidths(NamedTuple):
     """The half-widths of the program: ``rho_i = factor_i · h[column_i]``, then r likewise.
 
-    columns, factors (q + m,); lower, upper, cost (w,) of the columns h. Rows with column −1 are equations.
+    columns, factors (q + m,); lower, upper, cost (w,) of the columns h. Where the column is −1, the half-width is the
+    factor itself; where that is 0 too, the row is an equation.
     """
 
     columns: NDArray[np.int64]
@@ -98,16 +99,19 @@ class HalfWidths(NamedTuple):
         return cls(np.arange(lower.size), np.ones(lower.size), lower, upper, weights)
 
     @classmethod
-    def common_factor(cls, shape: Vector) -> HalfWidths:
-        """One unknown factor of all; shape (q + m,), 0 where there is no noise."""
-        columns = np.where(shape > 0, 0, -1)
+    def common_factor(cls, shape: Vector, learns: NDArray[np.bool_] | None = None) -> HalfWidths:
+        """One unknown factor of all half-widths that are learned; shape (q + m,), 0 where there is no noise.
+
+        learns (q + m,): the others keep the half-width of ``shape``; ``None``: all are learned.
+        """
+        columns = np.where((shape > 0) & (True if learns is None else learns), 0, -1)
         return cls(columns, shape, np.zeros(1), np.full(1, np.inf), np.ones(1))
 
     def values(self, h: Vector) -> Vector:
         """All half-widths (q + m,)."""
-        if h.size == self.columns.size:
+        if h.size == self.columns.size > 1:
             return h
-        return np.where(self.columns >= 0, self.factors * h[np.maximum(self.columns, 0)], 0.0)
+        return np.where(self.columns >= 0, self.factors * h[np.maximum(self.columns, 0)], self.factors)
 
 
 class WindowProgram:
@@ -125,6 +129,10 @@ class WindowProgram:
             uses[i, j] = True
         self._uses = uses
         self._separate_outputs = np.array_equal(uses, np.eye(len(uses)))
+        q, n = structure.noise_count, structure.model.state_count
+        self._known_reach = np.concatenate([np.where(widths.columns[:q] < 0, widths.factors[:q], 0.0), np.zeros(n - q)])
+        self._has_spread = False
+        """Whether a window ever had inputs that were known to lie in an interval only."""
         self._minus_B = -(structure.transform @ structure.known["B"]).T
 
     def solve(self, data: WindowData, point: Selected = "centre", cost: Vector | None = None) -> WindowSolution:
@@ -213,7 +221,8 @@ class WindowProgram:
         q, widths = self.structure.noise_count, self.widths
         states, outputs = (N - 1) * n, N * m
         columns = np.concatenate([widths.columns[:q], np.full(n - q, -1)]), widths.columns[q:]
-        factors = np.concatenate([widths.factors[:q], np.ones(n - q)]), widths.factors[q:]
+        factors = np.concatenate([widths.factors[:q], np.zeros(n - q)]), widths.factors[q:]
+        known = [np.where(column < 0, factor, 0.0) for column, factor in zip(columns, factors, strict=True)]
         return Rows(
             first=np.concatenate([np.repeat(np.arange(N - 1) * n, n), np.repeat(np.arange(N) * n, m)]),
             span=np.concatenate([np.full(states, 2 * n), np.full(outputs, n)]),
@@ -222,7 +231,7 @@ class WindowProgram:
             d=np.zeros(states + outputs),
             width=np.concatenate([np.tile(columns[0], N - 1), np.tile(columns[1], N)]),
             factor=np.concatenate([np.tile(factors[0], N - 1), np.tile(factors[1], N)]),
-            reach=np.zeros(states + outputs),
+            reach=np.concatenate([np.tile(known[0], N - 1), np.tile(known[1], N)]),
         )
 
     def _write_transitions(
@@ -241,7 +250,9 @@ class WindowProgram:
         if self._patterns["A"]:
             constant += before @ structure.unknown_part("A", data.theta).T @ P.T
         d[:] = constant.ravel()
-        reach[:] = (np.abs(P @ data.B) @ data.spread[:, :, None]).ravel() if data.spread.any() else 0.0
+        if data.spread.any() or self._has_spread:
+            self._has_spread = True
+            reach[:] = np.tile(self._known_reach, len(before)) + (np.abs(P @ data.B) @ data.spread[:, :, None]).ravel()
         if not structure.has_unknown:
             return
         block = g.reshape(len(before), n, len(structure.entries))
