@@ -20,6 +20,7 @@ LAYERS = {
     "lsu_mesh.metrics": 4,
     "lsu_mesh.filters": 5,
     "lsu_mesh.fusion": 5,
+    "lsu_mesh.identification": 6,
     "lsu_mesh.experiments": 6,
     "lsu_mesh.mesh": 7,
     "services": 8,

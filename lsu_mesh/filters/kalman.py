@@ -148,11 +148,6 @@ class Kalman(Filter):
         lower, upper = checked_prior(self._model, support).bounds()
         self._held = Gaussian(0.5 * (lower + upper), np.diag(uniform_variance(0.5 * (upper - lower))))
 
-    @property
-    def is_resumable(self) -> bool:
-        """Support and bounds do not tell all that later sets depend on."""
-        return False
-
     def snapshot(self) -> object:
         """Mean and covariance."""
         return self._held

@@ -319,11 +319,6 @@ class WindowMAP(Filter):
             np.zeros(q), np.zeros(m), none, none, np.zeros(1, dtype=np.int64), 0.5 * (high - low), None,
         )  # fmt: skip
 
-    @property
-    def is_resumable(self) -> bool:
-        """Support and bounds do not tell all that later sets depend on."""
-        return False
-
     def snapshot(self) -> object:
         """The window; none of its arrays is ever written again."""
         return self._state

@@ -136,7 +136,7 @@ class WindowProgram:
         self._minus_B = -(structure.transform @ structure.known["B"]).T
 
     def solve(self, data: WindowData, point: Selected = "centre", cost: Vector | None = None) -> WindowSolution:
-        """The answer to the window's program.
+        """The answer to the window's program; a centred point also where the simplex method ends without a vertex.
 
         Raises
         ------
@@ -159,6 +159,8 @@ class WindowProgram:
         solution, share = self._by_highs(rows, limits, data, point)
         if point == "centre" and violation <= ACCEPTED_VIOLATION * scale and value - bound < share * scale:
             solution, share = self._solution(z, data, value, bound, iterations, "interior-point"), 0.0
+        if share > LARGEST_SHARE and point == "vertex":
+            return self.solve(data, "centre", cost)
         if share > LARGEST_SHARE:
             raise UnsolvedProgram(
                 f"the window's program was not solved: objective {solution.objective:.6g}, "

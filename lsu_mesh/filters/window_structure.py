@@ -103,6 +103,7 @@ class Structure:
     def settled(self, theta: Vector) -> Structure:
         """The same structure with these values and nothing unknown."""
         changes: dict[str, object] = {"A": self.at("A", theta), "C": self.at("C", theta)}
+        changes["outputs"] = self.model.outputs
         if self.model.B is not None:
             changes["B"] = self.at("B", theta)
         E = None if self.model.noise_map is not None else self.at("E", theta)
@@ -117,6 +118,7 @@ class Structure:
         if not np.array_equal(F, np.eye(len(F))):
             raise ModelError("a model with F ≠ I has no LSU form; multiply y by F and use F = I")
         changes: dict[str, object] = {"A": self.at("A", theta), "C": self.at("C", theta)}
+        changes["outputs"] = self.model.outputs
         if self.model.B is not None:
             changes["B"] = self.at("B", theta)
         if not np.array_equal(E, np.eye(len(E))):
