@@ -1,7 +1,7 @@
 """Compile every kernel once, or load it from the cache, by doing a few steps of everything.
 
 ``python -m lsu_mesh.filters.warm_up`` does it at set-up, so that no process compiles anything later. Where the cache is
-empty and there are cores for it, two processes compile one half of the kernels each beforehand.
+empty and there are cores for it, several processes compile a share of the kernels each beforehand.
 """
 
 from __future__ import annotations
@@ -30,15 +30,19 @@ OPTIONS: dict[str, tuple[dict[str, object], ...]] = {
     "ZonotopicKalman": ({}, {"form": "predictor"}),
 }
 """Options whose code differs, by kind."""
-HALVES = {"step": ("LSUO", "LSUP", "LSUPB"), "programs": ("LSUCZ", "ZonotopicKalman")}
-"""Kinds of filters whose steps have few kernels in common."""
+SHARES = {
+    "step": ("LSUO", "LSUP", "LSUPB"),
+    "programs": ("LSUCZ", "ZonotopicKalman"),
+    "window": ("TruncatedKalman", "WindowMAP"),
+}
+"""Kinds of filters whose steps have few kernels in common; kinds that are in none are compiled last."""
 
 
 def warm_up() -> float:
     """Run every filter for a few steps, with and without a noise map and a domain; the seconds that it took."""
     began = time.perf_counter()
     if awaits_compilation(step.advance) and awaits_compilation(hull.maxima) and _cores() > 1:
-        _compile_in_two_processes()
+        _compile_in_processes()
     A, B, C = [[0.9, 0.2], [-0.1, 0.8]], [[0.1], [0.2]], [[1.0, 0.0], [1.0, 1.0]]
     prior = Orthotope([-1.0, -1.0], [1.0, 1.0])
     domain = Orthotope([-1.5, -1.5], [1.5, 1.5])
@@ -53,20 +57,20 @@ def warm_up() -> float:
     return time.perf_counter() - began
 
 
-def _compile_in_two_processes() -> None:
-    """Fill the cache by one process for each half; what they leave out, or fail at, is compiled here afterwards."""
+def _compile_in_processes() -> None:
+    """Fill the cache by one process for each share; what they leave out, or fail at, is compiled here afterwards."""
     command = [sys.executable, "-m", "lsu_mesh.filters.warm_up"]
-    children = [subprocess.Popen([*command, half], stderr=subprocess.DEVNULL) for half in HALVES]
+    children = [subprocess.Popen([*command, share], stderr=subprocess.DEVNULL) for share in SHARES]
     for child in children:
         child.wait()
 
 
-def _compile_half(half: str) -> None:
+def _compile_share(share: str) -> None:
     """The steps of these filters alone, in the loop where they have one."""
-    model = LSUModel(np.eye(2), np.eye(2), np.eye(2), 0.05, 0.1)
-    for kind in HALVES[half]:
+    model = LSUModel(np.eye(2), np.eye(2), np.eye(2), 0.05, 0.1, domain=([-9.0, -9.0], [9.0, 9.0]))
+    for kind in SHARES[share]:
         for options in OPTIONS.get(kind, ({},)):
-            if half == "step" and "hull" in options:
+            if share == "step" and "hull" in options:
                 continue
             engine = filter_class(kind)(model, Orthotope([-1.0, -1.0], [1.0, 1.0]), **options)  # type: ignore[call-arg]
             run_filter(engine, np.zeros((STEPS, 2)), np.zeros((STEPS, 2)))
@@ -95,6 +99,6 @@ def _one_by_one(engine: Filter, Y: np.ndarray, U: np.ndarray) -> None:
 
 if __name__ == "__main__":
     if len(sys.argv) > 1:
-        _compile_half(sys.argv[1])
+        _compile_share(sys.argv[1])
     else:
         print(f"kernels ready after {warm_up():.1f} s", file=sys.stderr)

@@ -83,11 +83,12 @@ def test_a_known_interval(interval: Path) -> None:
             assert row.excess < 1e-12
 
 
-def test_a_hull_that_is_too_small_is_seen(interval: Path) -> None:
-    def deaf(model: LSUModel, prior: Orthotope) -> LSUO:
-        return LSUO(model.replace(rho=model.rho * (1 - 1e-6)), prior)
+def test_a_hull_that_cuts_off_one_side_is_seen(interval: Path) -> None:
+    def shifted(model: LSUModel, prior: Orthotope) -> LSUO:
+        assert model.B is not None
+        return LSUO(model.replace(B=model.B * (1 + 1e-6)), prior)
 
-    assert measure(read_benchmark(interval), {"deaf": deaf})[0].cut_off > 1e-7
+    assert measure(read_benchmark(interval), {"shifted": shifted})[0].cut_off > 1e-7
 
 
 def test_the_command_prints_own_filters_and_published_estimators(lsu_mesh_command: list[str], interval: Path) -> None:

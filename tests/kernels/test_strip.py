@@ -159,3 +159,13 @@ def test_a_tightened_box_is_the_hull_of_box_and_strip(seed: int, n: int) -> None
             for sign in (1, -1)
         ]
         np.testing.assert_allclose([new_lower[j], new_upper[j]], ends, atol=1e-7)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (1, 0, 2), (0, 2, 1), (2, 1, 0)])
+def test_a_sum_that_cancels_does_not_empty_a_box(order: tuple[int, ...]) -> None:
+    """``2⁵³ + 1 − 2⁵³`` is 1, in doubles 0 in some orders: the strip ``x₁ + x₂ + x₃ = 1`` holds this very point."""
+    point = np.array([2.0**53, 1.0, -(2.0**53)])[list(order)]
+    lower, upper = point.copy(), point.copy()
+    assert tighten(lower, upper, np.ones(3), 1.0, 1.0) != strip.EMPTY
+    assert (lower <= point).all()
+    assert (point <= upper).all()
