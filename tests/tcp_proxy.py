@@ -78,13 +78,14 @@ class Proxy:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result(timeout=10)
 
     async def _end(self) -> None:
+        """Refuse and close; each connection then ends by itself, so that no accepted socket is forgotten."""
+        self._is_cut = True
+        self._flows.set()
+        await asyncio.sleep(0.01)  # what waits to be accepted is: a closed server would leave it open
         self._server.close()
-        await asyncio.sleep(0.02)  # what was accepted just now gets its transport, else nobody would close it
-        self._close_all()
-        others = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
-        for task in others:
-            task.cancel()
-        await asyncio.gather(*others, return_exceptions=True)
+        while len(asyncio.all_tasks()) > 1:
+            self._close_all()
+            await asyncio.sleep(0.005)
         for _ in range(3):
             await asyncio.sleep(0)  # aborted transports close in the next turns of the loop
 
@@ -96,8 +97,8 @@ class Proxy:
         try:
             if not self._is_cut:
                 await self._forward(reader, writer)
-        except (OSError, asyncio.CancelledError):
-            return  # there is no target, or the proxy ends
+        except OSError:
+            return  # there is no target
         finally:
             writer.transport.abort()
 
