@@ -133,7 +133,7 @@ class FusionNode(Estimator):
 
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
         self._rejected = []
-        sources = self._sound_sources(step)
+        sources = [] if self._passes_over() else self._sound_sources(step)
         abandoned = self._leave_abandoned_epoch(k, now)
         missing = [name for name in self.sources if name not in step.arrived]
         self._met = self.engine.bounds()
@@ -152,6 +152,10 @@ class FusionNode(Estimator):
         origin = min((source.message.origin_ns for source in outcome.used), default=None)
         used = [source.message.reference for source in outcome.used]
         return Combined(outcome.status, used, missing, origin, outcome.cause), messages
+
+    def _passes_over(self) -> bool:
+        """Far behind, a step is only predicted through: nobody is told of it, and later sources know what it knew."""
+        return self._is_behind() and not self.unsound and self.epochs.abandoned is None
 
     def _rely_on(self, used: Sequence[Source]) -> None:
         """No single source carries a relaxed set: of those that are learned, or abandoned, ``faults`` may be wrong."""
