@@ -150,6 +150,16 @@ class Bus:
 
         self._session.get(key, answered, timeout=2.0)
 
+    def ask_cache(self, key: str) -> None:
+        """Ask the publisher of a key for all that its cache holds; it is queued as samples."""
+
+        def answered(reply: Any) -> None:
+            if reply.ok is not None:
+                self._enqueue_sample(reply.ok)
+
+        selector = f"{key}/@adv/**?_anyke;_max={self._settings.cache}"
+        self._session.get(selector, answered, consolidation=zenoh.ConsolidationMode.NONE, timeout=5.0)
+
     def answer(self, key: str, answers: Callable[[], tuple[str, bytes, str] | None]) -> None:
         """Answer queries on ``key`` with ``(key, payload, encoding)``."""
 

@@ -12,6 +12,7 @@ from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
 from services.bus import Arrival, Bus, Clock, SessionSettings
+from services.recovery import Recovery
 from services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
@@ -50,6 +51,7 @@ class Peer:
         self._mesh = node.configuration.mesh.name
         self._links = -1
         self._next_look = 0
+        self._recovery = Recovery(node.gate, bus.ask_cache)
 
     def declare(self) -> None:
         """Publishers, subscriptions, the liveliness token, queries and answers."""
@@ -92,6 +94,7 @@ class Peer:
     def turn(self) -> None:
         """Wait for something to do, then do all of it."""
         self._watch_links()
+        self._recovery.look(self._clock.now())
         arrival = self._bus.next(self._patience())
         while arrival is not None:
             self._publish(self._take(arrival))

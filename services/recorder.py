@@ -16,6 +16,7 @@ from services.bus import Arrival, Bus, Clock, SessionSettings
 from services.cli import COULD_NOT_START, OK
 from services.recording.recorder import Recorder
 from services.recording.stream import next_part
+from services.recovery import Recovery
 from services.stop import Stop
 
 ROLE_NAME = "recorder"
@@ -65,6 +66,7 @@ class RecorderService:
         self._clock = clock
         self._mesh = configuration.mesh.name
         self._gate = Gate(configuration, TYPES)
+        self._recovery = Recovery(self._gate, bus.ask_cache)
         self._boot = secrets.token_hex(8)
         self._sequence = 0
         self._next_health = 0
@@ -87,6 +89,7 @@ class RecorderService:
             self._take(arrival)
             arrival = self._bus.next(0)
         now = self._clock.now()
+        self._recovery.look(now)
         self._recorder.tick(now)
         links = self._bus.links()
         if now >= self._next_health or links != self._links:

@@ -27,6 +27,7 @@ from services.bus import Bus, Clock, SessionSettings
 from services.certificate_authority import LOOPBACK_HOSTS
 from services.commands.configuration import cache_size
 from services.commands.keys import make_files
+from services.recovery import Recovery
 from services.security import certificates
 from services.supervisor import Child, Supervisor
 
@@ -192,8 +193,10 @@ class LiveMesh:
         return [*arguments, "-m", "client", "-e", f"tls/127.0.0.1:{proxy.port}"]
 
     def _observe(self) -> None:
+        recovery = Recovery(self.observer.gate, self._bus.ask_cache)
         try:
             while not self._ending.is_set():
+                recovery.look(self.clock.now())
                 arrival = self._bus.next(0.1)
                 if arrival is not None:
                     self.observer.take(arrival.what, arrival.key, arrival.payload, arrival.arrival_ns)

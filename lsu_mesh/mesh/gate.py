@@ -106,6 +106,14 @@ class Gate:
         """Messages that are known to exist and have not come."""
         return sum(sequence.gaps for sequence in self._sequences.values())
 
+    def gaps_by_key(self) -> dict[str, int]:
+        """The same by key, without the keys that lack nothing."""
+        gaps: Counter[str] = Counter()
+        for (key, _), sequence in self._sequences.items():
+            if sequence.gaps:
+                gaps[key] += sequence.gaps
+        return dict(gaps)
+
     @property
     def counters(self) -> dict[str, float]:
         """All counts, for the health message."""

@@ -1,0 +1,46 @@
+"""Asks again for what a subscriber's own recovery has left out.
+
+Advanced subscribers ask a publisher's cache once for what they missed. When that one question is lost, as it may be
+while a link comes back, the gap would stay. The gate counts gaps, and here they are asked for until they close.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from lsu_mesh.mesh.gate import Gate
+
+SECOND_NS = 1_000_000_000
+MOST_TRIES = 5
+"""Then the messages have left the publisher's cache, or the publisher is gone."""
+
+
+class Recovery:
+    """Once a second, asks for the keys whose gaps have not changed since the second before.
+
+    ``ask`` gets a key and brings what its publisher's cache holds; copies are dropped by the gate.
+    """
+
+    def __init__(self, gate: Gate, ask: Callable[[str], None]) -> None:
+        self._gate = gate
+        self._ask = ask
+        self._next = 0
+        self._seen: dict[str, int] = {}
+        self._tries: dict[str, int] = {}
+        self.asked = 0
+        """Questions so far."""
+
+    def look(self, now: int) -> None:
+        """Do what is due."""
+        if now < self._next:
+            return
+        self._next = now + SECOND_NS
+        gaps = self._gate.gaps_by_key()
+        for key, count in gaps.items():
+            if self._seen.get(key) != count:
+                self._tries.pop(key, None)  # something comes: wait for the rest
+            elif self._tries.get(key, 0) < MOST_TRIES:
+                self._tries[key] = self._tries.get(key, 0) + 1
+                self.asked += 1
+                self._ask(key)
+        self._seen = gaps
