@@ -24,8 +24,14 @@ AFTER_STOP_S = 0.5
 """How long the recorder goes on taking what is under way after it was told to stop."""
 
 
-def run_recorder(configuration: Configuration, record: str | None, settings: SessionSettings, stop: Stop) -> int:
-    """Record until told to stop; returns the exit code."""
+def run_recorder(
+    configuration: Configuration,
+    record: str | None,
+    settings: SessionSettings,
+    stop: Stop,
+    serve_port: int | None = None,
+) -> int:
+    """Record until told to stop, and let viewers follow on ``serve_port`` of the loopback; returns the exit code."""
     clock = Clock()
     template = record or configuration.recorder.path
     moment = time.strftime("%Y%m%d-%H%M%S")
@@ -34,7 +40,7 @@ def run_recorder(configuration: Configuration, record: str | None, settings: Ses
     part = next_part(path) if was_restarted else path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        recorder = Recorder(configuration, part, continues=path if part != path else None)
+        recorder = Recorder(configuration, part, serve_port=serve_port, continues=path if part != path else None)
     except OSError as error:
         print(
             f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record",

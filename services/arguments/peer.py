@@ -46,6 +46,10 @@ def _add_peer(commands: Commands, role: str, words: str) -> None:
         parser.add_argument("--rate", type=float, metavar="HZ", help="steps per second of wall clock (default: 1/dt)")
     if role == "recorder":
         parser.add_argument("--record", metavar="FILE", help="recording to write (default: recorder.path)")
+        parser.add_argument(
+            "--serve", type=int, metavar="PORT",
+            help="let viewers follow at rerun+http://127.0.0.1:PORT/proxy (default: no network)",
+        )  # fmt: skip
     add_overrides(parser)
     add_network(parser)
     parser.set_defaults(handler="services.commands.peer", runs_until_stopped=True, role=role)

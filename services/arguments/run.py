@@ -14,6 +14,11 @@ def add(commands: Commands) -> None:
     parser.add_argument("--seed", type=int, metavar="S", help="seed of the simulation (mesh.seed)")
     parser.add_argument("--record", metavar="FILE", help="recording to write (default: recorder.path)")
     parser.add_argument("--no-record", action="store_true", help="start no recorder")
+    parser.add_argument("--view", action="store_true", help="follow in the native viewer; it may come, freeze and go")
+    parser.add_argument(
+        "--web", nargs="?", type=int, const=9090, metavar="PORT",
+        help="serve the web viewer on this port of the loopback interface (default: 9090)",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout instead of a table")
     add_insecure(parser)
     add_overrides(parser)

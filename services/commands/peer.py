@@ -44,7 +44,7 @@ def _run(configuration: Configuration, options: argparse.Namespace) -> int:
     if options.role == "recorder":
         from services.recorder import run_recorder
 
-        return run_recorder(configuration, options.record, settings, options.stop)
+        return run_recorder(configuration, options.record, settings, options.stop, options.serve)
     from services.peer import run_node
 
     return run_node(make_node(configuration, options), settings, options.stop)

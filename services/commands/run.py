@@ -21,6 +21,7 @@ from services.security import InsecureSession, certificates, check_endpoints
 from services.stop import Stop
 from services.supervisor import Supervisor
 from services.table import Progress, print_json, print_table
+from services.viewers import Viewer, free_port
 
 READY_S = 60.0
 """How long the peers may take to start; the first start on a machine compiles the kernels."""
@@ -62,6 +63,7 @@ class Run:
     recording: Path | None
     player: Player | None = None
     """Publishes what plant and sensors published in a recording, in their place."""
+    viewer: Viewer | None = None
     alive: set[str] = field(default_factory=set)
     happened: list[str] = field(default_factory=list)
     began: float = field(default_factory=time.monotonic)
@@ -79,6 +81,8 @@ class Run:
         while arrival is not None:
             self._take(arrival)
             arrival = self.bus.next(0)
+        if self.viewer is not None and (words := self.viewer.end_words()):
+            self.note(words)
         for child, words in self.supervisor.watch(time.monotonic()):
             self.note(words)
             if child.process is not None and child.process.poll() is not None and child.words:
@@ -102,6 +106,9 @@ class Run:
 def main(options: argparse.Namespace) -> int:
     configuration = load_or_explain(options.file, options)
     if configuration is None:
+        return USAGE
+    if options.no_record and (options.view or options.web is not None):
+        print("run: viewers follow the recorder; leave out --no-record", file=sys.stderr)
         return USAGE
     print_warnings(configuration)
     return run_mesh(configuration, options)
@@ -152,6 +159,7 @@ def _supervise(run: Run) -> int:
     run.bus.watch_alive(key(run.configuration.mesh.name, "live", "*"))
     if run.player is not None:
         run.player.announce(run.bus)
+    run.viewer = _viewer(run)
     try:
         _announce(run)
         code = _start(run)
@@ -160,6 +168,8 @@ def _supervise(run: Run) -> int:
     finally:
         run.stopping = True
         complaints = run.supervisor.stop()
+        if run.viewer is not None:
+            run.viewer.close()
         run.supervisor.kill()
     run.happened += complaints
     if code != OK:
@@ -168,6 +178,13 @@ def _supervise(run: Run) -> int:
         return OK if run.stop.is_set else code
     _settle(run)
     return _sum_up(run)
+
+
+def _viewer(run: Run) -> Viewer | None:
+    """The viewer that is asked for; it follows the recorder."""
+    web_port: int | None = getattr(run.options, "web", None)
+    is_wanted = web_port is not None or getattr(run.options, "view", False)
+    return Viewer(free_port(), web_port is not None, web_port or 0) if is_wanted and run.recording else None
 
 
 def _announce(run: Run) -> None:
@@ -197,6 +214,8 @@ def _start(run: Run) -> int:
             held.append(child)
     if not _await_mesh(run, names):
         return COULD_NOT_START
+    if run.viewer is not None:
+        print(run.viewer.open(), file=sys.stderr)
     begin = run.clock.now() + int(START_LEAD_S * 1e9)
     if run.player is not None:
         run.player.begin(begin)
@@ -228,6 +247,8 @@ def _arguments(run: Run, role: str) -> list[str]:
         arguments += ["--start-at", "-"]
     if role == "recorder":
         arguments += ["--record", str(run.recording)]
+        if run.viewer is not None:
+            arguments += ["--serve", str(run.viewer.port)]
     return arguments
 
 

@@ -1,0 +1,55 @@
+"""``lsu-mesh run --view`` and ``--web``: viewers come and go, the run does without them."""
+
+from __future__ import annotations
+
+import time
+import urllib.request
+from urllib.error import URLError
+
+import psutil
+import pytest
+
+from services.recording.read import read_raw
+from services.viewers import free_port
+
+pytestmark = pytest.mark.live
+
+
+def page(port: int, timeout: float = 90.0) -> str:
+    """The page of the web viewer, as soon as it is served."""
+    end = time.monotonic() + timeout
+    while True:
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5) as answer:
+                return str(answer.read().decode())
+        except (URLError, ConnectionError, TimeoutError):
+            assert time.monotonic() < end, "no page"
+            time.sleep(0.1)
+
+
+def test_the_web_viewer_is_served_on_the_loopback_alone_and_ends_with_the_run(start_run) -> None:  # type: ignore[no-untyped-def]
+    port = free_port()
+    session = start_run("--steps", "300", "--rate", "25", "--record", "web.rrd", "--web", str(port))
+    assert "<html" in page(port)
+    viewer = session.child("--serve-web")
+    processes = [viewer, session.child("recorder recorder")]
+    listening = [c.laddr for p in processes for c in p.net_connections("tcp") if c.status == psutil.CONN_LISTEN]
+    assert len(listening) >= 2
+    assert {address.ip for address in listening} == {"127.0.0.1"}
+    viewer.suspend()
+    time.sleep(1.0)
+    viewer.kill()
+    assert session.wait() == 0, session.output[1]
+    assert "http://127.0.0.1" in session.output[1]
+    assert any("the viewer ended" in words for words in session.of("run")[0]["happened"])
+    steps = [m for m in read_raw(session.folder / "web.rrd") if "/truth/" in m.key]
+    assert len(steps) == 300, "a viewer that freezes and dies leaves no gap"
+
+
+def test_a_native_viewer_without_a_display_is_said_and_changes_nothing(start_run, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    session = start_run("--steps", "150", "--record", "view.rrd", "--view")
+    assert session.wait() == 0, session.output[1]
+    assert any("no display?" in words for words in session.of("run")[0]["happened"])
+    assert {row["last_step"] for row in session.of("estimator")} == {150}
