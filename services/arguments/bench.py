@@ -10,9 +10,10 @@ def add(commands: Commands) -> None:
     parser = new_command(commands, "bench", "measure speed and tightness beside other libraries")
     parser.add_argument(
         "what",
-        choices=("kernels", "tightness"),
+        choices=("kernels", "tightness", "recording"),
         help="kernels: cost of steps, hulls, banks, a new process, as ratios in one run on one core; "
-        "tightness: hulls beside the exact ones and the published estimators of a benchmark",
+        "tightness: hulls beside the exact ones and the published estimators of a benchmark; "
+        "recording: processor time and bytes of recording 12 filters at 200 Hz, batched and one by one",
     )
     parser.add_argument(
         "--benchmarks", nargs="+", default=[], metavar="FILE", help="tightness: JSON files of published benchmarks"

@@ -24,6 +24,10 @@ def main(options: argparse.Namespace) -> int:
         from services.commands import tightness
 
         return tightness.main(options)
+    if options.what == "recording":
+        from services.commands import recording_cost
+
+        return recording_cost.main(options)
     from lsu_mesh.experiments.kernel_speed import figures, report
 
     if options.out is not None and not _can_draw():

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 import rerun as rr
-from made_up_mesh import START_NS, Arrival, written
 
 from lsu_mesh.mesh.config import Configuration
+from services.recording.made_up_mesh import START_NS, Arrival, written
 from services.recording.recorder import Recorder
 
 

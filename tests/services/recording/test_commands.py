@@ -9,12 +9,12 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from local_mesh import LocalMesh
-from made_up_mesh import MadeUpMesh, written
 from recorded_mesh import record
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Measurement
 from services.cli import FAILURE, OK, USAGE, main
+from services.recording.made_up_mesh import MadeUpMesh, written
 from services.recording.read import read_raw
 from services.recording.recorder import Recorder
 from services.recording.stream import next_part

@@ -12,8 +12,8 @@ import pytest
 from headless_viewer import HeadlessViewer, why_not
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from made_up_mesh import MadeUpMesh, written
 
+from services.recording.made_up_mesh import MadeUpMesh, written
 from services.recording.mend import mend
 from services.recording.read import read_raw
 from services.recording.recorder import Recorder
@@ -23,7 +23,7 @@ WRITER = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from made_up_mesh import MadeUpMesh
+from services.recording.made_up_mesh import MadeUpMesh
 from lsu_mesh.mesh.config import load
 from services.recording.recorder import Recorder
 recorder = Recorder(load(Path(sys.argv[2])), Path(sys.argv[3]))

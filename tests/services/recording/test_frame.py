@@ -9,9 +9,9 @@ import pytest
 import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
-from made_up_mesh import written
 
 from services.recording.frame import READABLE, Frame, readable_scale
+from services.recording.made_up_mesh import written
 from services.recording.names import Names
 from services.recording.timeline import Moment, Timelines
 

@@ -6,9 +6,9 @@ import itertools
 from pathlib import Path
 
 import pytest
-from made_up_mesh import written
 
 from services.recording import palette
+from services.recording.made_up_mesh import written
 from services.recording.palette import Color
 
 EVERY = [palette.TRUTH, palette.OTHER, *palette.FUSIONS, *palette.FILTERS]

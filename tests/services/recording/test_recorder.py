@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_up_mesh import START_NS, STEP_NS, Arrival, MadeUpMesh, written
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
@@ -24,6 +23,7 @@ from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from services.recording.body import Body, body
+from services.recording.made_up_mesh import START_NS, STEP_NS, Arrival, MadeUpMesh, written
 from services.recording.read import read_raw
 from services.recording.recorder import Recorder
 from services.recording.stream import next_part

@@ -11,11 +11,11 @@ import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 from headless_viewer import HeadlessViewer, free_port, why_not
-from made_up_mesh import START_NS, STEP_NS, MadeUpMesh, written
 from PIL import Image
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Event
+from services.recording.made_up_mesh import START_NS, STEP_NS, MadeUpMesh, written
 from services.recording.palette import TRUTH, Color, colors
 from services.recording.read import read_raw
 from services.recording.recorder import Recorder

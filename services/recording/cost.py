@@ -1,66 +1,78 @@
-"""What recording costs: ``python benchmarks/recording.py [--filters 12] [--states 3] [--rate 200] [--steps 600]``.
+"""What recording costs: processor time per message and bytes per step, batched and logged one by one.
 
-Feeds the messages of a made-up mesh to the recorder as fast as it takes them and prints the processor time per message
-(all threads), the share of one core at the given rate, and the bytes per step. Beside it, in the same run: the same
+The messages of a made-up mesh go to the recorder as fast as it takes them. Beside it, in the same run: the same
 entities logged one by one as the messages come, sets as often as the recorder draws them.
 """
 
 from __future__ import annotations
 
-import argparse
 import gc
-import json
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 import numpy as np
 import rerun as rr
-from made_up_mesh import START_NS, Arrival, MadeUpMesh, written
 from numpy.typing import NDArray
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Measurement, Posterior, Prediction, Truth
 from services.recording.body import body, project
+from services.recording.made_up_mesh import START_NS, Arrival, MadeUpMesh, written
 from services.recording.names import Names, path
+from services.recording.read import read_raw
 from services.recording.recorder import Recorder
 
 NAIVE_STEPS = 60
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Measure and print; exit code 1 if the recorder could not keep up or lost something."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--filters", type=int, default=12)
-    parser.add_argument("--states", type=int, default=3)
-    parser.add_argument("--rate", type=float, default=200.0, help="steps per second")
-    parser.add_argument("--steps", type=int, default=600)
-    parser.add_argument("--json", action="store_true")
-    options = parser.parse_args(arguments)
+@dataclass(frozen=True)
+class Cost:
+    """Costs of one recording; processor time is that of all threads."""
+
+    filters: int
+    rate: float
+    messages: int
+    microseconds_per_message: float
+    share_of_one_core: float
+    """Processor time per second of the run."""
+    bytes_per_step: int
+    naive_microseconds_per_message: float
+    naive_over_batched: float
+    lost: int
+    """Messages that are not in the file, bit by bit."""
+    problems: list[str]
+
+
+def measure(filters: int = 12, states: int = 3, rate: float = 200.0, steps: int = 600) -> Cost:
+    """Record ``steps`` steps of a mesh of so many filters at ``rate`` steps per second."""
     with tempfile.TemporaryDirectory() as folder:
-        configuration = written(Path(folder), options.states, options.filters, 1.0 / options.rate)
-        arrivals = paced(MadeUpMesh(configuration), options.steps, options.rate)
+        configuration = written(Path(folder), states, filters, 1.0 / rate)
+        arrivals = paced(MadeUpMesh(configuration), steps, rate)
         gc.collect()
         gc.freeze()  # the prepared messages are no garbage of the recorder
-        batched, size, problems = batch_cost(configuration, arrivals, Path(folder) / "batched.rrd")
+        target = Path(folder) / "batched.rrd"
+        batched, size, problems = batch_cost(configuration, arrivals, target)
+        gc.unfreeze()
+        stored = [(message.key, message.payload) for message in read_raw(target)]
+        lost = sum(one != (a.key, a.payload) for one, a in zip(stored, arrivals, strict=False))
+        lost += abs(len(arrivals) - len(stored))
         few = [arrival for arrival in arrivals if arrival.message.step <= NAIVE_STEPS]
         naive = naive_cost(configuration, few, Path(folder) / "naive.rrd")
-    per_step = len(arrivals) / options.steps
-    result = {
-        "messages": len(arrivals),
-        "microseconds_per_message": round(batched * 1e6, 1),
-        "share_of_one_core": round(batched * per_step * options.rate, 3),
-        "bytes_per_step": round(size / options.steps),
-        "naive_microseconds_per_message": round(naive * 1e6, 1),
-        "naive_over_batched": round(naive / batched, 1),
-        "problems": problems,
-    }
-    print(json.dumps(result) if options.json else "\n".join(f"{key:32} {value}" for key, value in result.items()))
-    return 1 if problems or result["share_of_one_core"] >= 1 else 0
+    return Cost(
+        filters=filters,
+        rate=rate,
+        messages=len(arrivals),
+        microseconds_per_message=round(batched * 1e6, 1),
+        share_of_one_core=round(batched * len(arrivals) / steps * rate, 3),
+        bytes_per_step=round(size / steps),
+        naive_microseconds_per_message=round(naive * 1e6, 1),
+        naive_over_batched=round(naive / batched, 1),
+        lost=lost,
+        problems=problems,
+    )
 
 
 def paced(mesh: MadeUpMesh, steps: int, rate: float) -> list[Arrival]:
@@ -140,13 +152,9 @@ class Naive:
             corners, normals = drawn.triangles.reshape(-1, 3), np.repeat(drawn.normals, 3, axis=0)
             entity = path("space", "sets", message.name)
             self.stream.log(entity, rr.Mesh3D(vertex_positions=corners, vertex_normals=normals))
-            self.stream.log(f"{entity}/edges", rr.LineStrips3D(drawn.edges))
+            self.stream.log(f"{entity}/edges", rr.LineStrips3D(list(drawn.edges)))
 
     def _band(self, entity: str, values: NDArray[np.float64]) -> None:
         half = 0.5 * (values[2] - values[0])
         series = [values[0] + half, *values]
         self.stream.log(entity, rr.Measurements(series, variances=[half * half, 0.0, 0.0, 0.0]))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
