@@ -71,7 +71,7 @@ class Frame:
 
     def _arrows(self, scale: Array) -> list[rr.ComponentColumn]:
         d = len(self._axes)
-        corner = np.array([-1.1] * d + [0.0] * (3 - d)) if d > 1 else np.array([-1.0, 0.0, 0.0])
+        corner = np.array([-1.0] * d + [0.0] * (3 - d)) if d > 1 else np.array([-1.0, 0.0, 0.0])
         labels = [
             f"{label}: {size:g} {unit}".rstrip()
             for label, size, unit in zip(self._labels, scale, self._units, strict=True)
