@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.messages import (
+    ConstrainedZonotopeMessage,
     Fused,
     Input,
+    IntersectionMessage,
     Measurement,
     Message,
+    OrthotopeMessage,
     Posterior,
     Prediction,
     Refused,
+    SupportMessage,
     Truth,
     decode,
 )
@@ -30,6 +34,7 @@ ROLE_OF_TOPIC = {
 WINDOW = 4096
 """How far back in a sequence a message may come late and still be told from a copy."""
 MOST_BOOTS = 16
+UNLIMITED = 4096
 
 
 class Sequence:
@@ -74,18 +79,23 @@ class Gate:
         self._topics = frozenset(topics)
         self._states = configuration.base_model.state_count
         self._inputs = configuration.base_model.input_count
+        self._last = configuration.mesh.steps
+        self._most_generators = most_generators(configuration)
         self._rows = {name: len(sensor.C) for name, sensor in configuration.sensors.items()}
         self._names = {
             "plant": frozenset({configuration.plant.name} if configuration.plant else ()),
             "sensor": frozenset(configuration.sensors),
             "filter": frozenset(configuration.filters),
             "fusion": frozenset(configuration.fusion),
+            "recorder": frozenset({"recorder"}),
         }
         self._sequences: dict[tuple[str, str], Sequence] = {}
         self.received = 0
         self.duplicates = 0
         self.refused: Counter[str] = Counter()
         self.last_refusal = ""
+        self.decoder: Callable[[str, bytes], Message] = decode
+        """What makes messages of payloads; many receivers in one process may share one with a memory."""
 
     def admit(self, key: str, payload: bytes) -> Message | None:
         """The message, or ``None`` when it is refused or a copy."""
@@ -129,11 +139,11 @@ class Gate:
         address = parse(key)
         if address is None or address.mesh != self._mesh or address.topic not in self._topics:
             raise Refused("key", "not a key that this peer listens to")
-        message = decode(address.topic, payload)
+        message = self.decoder(address.topic, payload)
         role = ROLE_OF_TOPIC.get(address.topic, message.src.partition("/")[0])
         if message.src != f"{role}/{address.name}":
             raise Refused("source", f"src is {message.src!r}, the key belongs to {role}/{address.name}")
-        if address.topic in ROLE_OF_TOPIC and address.name not in self._names[role]:
+        if address.name not in self._names.get(role, ()):
             raise Refused("unknown", f"the configuration has no {role} {address.name!r}")
         if message.model != self._digest:
             raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
@@ -155,6 +165,10 @@ class Gate:
             raise Refused("shape", f"{found} numbers, expected {expected}")
         if message.step < 1:
             raise Refused("step", "steps count from 1")
+        if self._last is not None and message.step > self._last + 1:
+            raise Refused("step", f"step {message.step} of a mesh that ends at step {self._last}")
+        if isinstance(message, Prediction | Posterior) and complexity(message.support) > self._most_generators:
+            raise Refused("complexity", f"more than {self._most_generators} generators or constraints")
 
     def _is_new(self, key: str, message: Message) -> bool:
         identity = (key, message.boot)
@@ -168,3 +182,27 @@ class Gate:
         known = [identity for identity in self._sequences if identity[0] == key]
         for identity in known[: max(0, len(known) - MOST_BOOTS + 1)]:
             del self._sequences[identity]
+
+
+def most_generators(configuration: Configuration) -> int:
+    """How many generators or constraints a set of this mesh may have at the most; more would cost others their time.
+
+    Twice the largest limit of any filter or fusion, and what a time update adds; 4096 where a filter has no limit.
+    """
+    model = configuration.base_model
+    limits = [settings.max_generators for settings in configuration.fusion.values()]
+    for settings in configuration.filters.values():
+        options = settings.options
+        limits.append(options.get("max_generators", 20) or UNLIMITED)
+        limits.append(int(options.get("order", 15) or UNLIMITED) * model.state_count)
+    return min(UNLIMITED, 2 * max(limits, default=0) + 2 * model.state_count + model.rho.size + 64)
+
+
+def complexity(support: SupportMessage) -> int:
+    """The number of generators or of constraints of a set, whichever is larger; the sum over an intersection."""
+    if isinstance(support, IntersectionMessage):
+        return sum(complexity(part) for part in support.parts)
+    if isinstance(support, OrthotopeMessage):
+        return len(support.lower)
+    columns = len(support.generators[0]) if support.generators else 0
+    return max(columns, len(support.b)) if isinstance(support, ConstrainedZonotopeMessage) else columns

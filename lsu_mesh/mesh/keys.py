@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from typing import NamedTuple
 
 PREFIX = "lsu/v1"
 TOPICS = ("truth", "input", "measurement", "prediction", "posterior", "fused", "health", "event", "live")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
+LONGEST = len(PREFIX) + 3 * 65
+"""Longest key in characters."""
 NAME_RULE = "1 to 64 ASCII letters, digits, '_', '-' or '.', the first a letter or a digit"
 
 READER = "viewer"
@@ -51,6 +54,11 @@ def last_key(mesh: str, name: str) -> str:
 
 def parse(text: str) -> Address | None:
     """The address in a key, or ``None`` when it is no key of this protocol."""
+    return _parsed(text) if len(text) <= LONGEST else None
+
+
+@functools.lru_cache(maxsize=4096)
+def _parsed(text: str) -> Address | None:
     chunks = text.split("/")
     if len(chunks) != 5 or "/".join(chunks[:2]) != PREFIX or chunks[3] not in TOPICS:
         return None

@@ -123,8 +123,13 @@ def test_a_missing_input_is_waited_for_and_never_guessed(mesh_of: MakeMesh) -> N
     orderly = finished(mesh_of("mesh.steps=30"))
     mesh = finished(mesh_of("mesh.steps=30", carry=carry))
     assert max(mesh.newest("box")) == 7
-    assert mesh.nodes["box"].waiting_for() == "input of step 7"
-    assert "waiting for input of step 7" in mesh.nodes["box"].health(mesh.now).reasons
+    assert mesh.nodes["box"].waiting_for() == "input of step 7 (lsu/v1/demo/input/plant)"
+    mesh.run(1.0)
+    health = mesh.nodes["box"].health(mesh.now)
+    assert health.level == "WARN"
+    assert any(
+        reason.startswith("waiting for input of step 7 (lsu/v1/demo/input/plant) for ") for reason in health.reasons
+    )
     node, address, payload = kept[0]
     mesh.publish(node, node.deliver(address, payload, mesh.now))
     mesh.turn()

@@ -11,13 +11,14 @@ from abc import abstractmethod
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import (
     Bounds,
     Fused,
@@ -30,7 +31,7 @@ from lsu_mesh.mesh.messages import (
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.epochs import Epochs
-from lsu_mesh.mesh.nodes.node import SECOND, Node
+from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
@@ -41,6 +42,8 @@ About = dict[str, str | int | float | None]
 Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 START_GRACE = SECOND // 2
 """How long a late joiner listens to the past before it chooses where to start."""
+STRANGE_SILENCE = 2 * SECOND
+"""A source that says nothing for longer, and for longer than usual, is complained of."""
 REHEARSED_STEPS = 6
 """So many steps bring a limited complexity into play."""
 BEHIND = 32
@@ -49,6 +52,10 @@ INPUT_LOST = 256
 """An input that has not come when so many later steps' inputs have is not coming any more: a plant repeats no more."""
 MOST_STEPS = 4096
 """Steps that are remembered while something is waited for."""
+MOST_AT_ONCE = 1024
+"""Steps done in one tick at the most; the next tick goes on."""
+FURTHEST = 4096
+"""So many steps, and four times those that the rate allows since the last message, a message may lie ahead."""
 MOST_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
 
@@ -73,6 +80,21 @@ class Step:
     """Whether its data were combined once; they are never waited for again."""
     revision: int = -1
     published: Posterior | None = None
+
+
+class Silence(NamedTuple):
+    """Since when a source has said nothing, and the longest that it ever said nothing."""
+
+    since: int
+    longest: int = 0
+
+    def heard(self, now: int) -> Silence:
+        """After one more message."""
+        return Silence(now, max(self.longest, now - self.since))
+
+    def is_strange(self, now: int) -> bool:
+        """Whether it is silent for much longer than it ever was."""
+        return now - self.since > max(STRANGE_SILENCE, 4 * self.longest)
 
 
 @dataclass(frozen=True)
@@ -107,6 +129,8 @@ class Estimator(Node):
         self._newest = 0
         self._signs: list[tuple[int, int]] = []
         """Each step that was the newest when it was first heard of, and when that was; both rise."""
+        self._silences: dict[str, Silence] = {}
+        """When each source was heard last."""
         self._heard_at: int | None = None
         """When the last message came, of whatever step."""
         self._first_evidence: int | None = None
@@ -119,7 +143,7 @@ class Estimator(Node):
         self._waiting = ""
         self._restarted = False
         self._counts: dict[str, float] = {
-            "late": 0, "rewinds": 0, "contradictions": 0, "behind": 0, "resets": 0,
+            "late": 0, "rewinds": 0, "contradictions": 0, "behind": 0, "resets": 0, "from the future": 0,
         }  # fmt: skip
         self.guarantee: Guarantee = engine.guarantee
         """The weakest guarantee among all that the set descends from."""
@@ -145,6 +169,11 @@ class Estimator(Node):
     def history(self) -> int:
         """How many steps back a late message may rewind."""
 
+    @property
+    def remembered(self) -> int:
+        """How many steps back inputs are kept, so that all of ``history`` can be done again."""
+        return self.history
+
     @abstractmethod
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
         """Bring the step's data into the engine's set; also events."""
@@ -165,6 +194,7 @@ class Estimator(Node):
 
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""
+        self._silences[source] = self._silences.get(source, Silence(now)).heard(now)
         step = self._see(message.step, now)
         if step is None:
             self._counts["late"] += 1
@@ -185,6 +215,8 @@ class Estimator(Node):
             return []
         if step.input is None:
             step.input = message
+            if self.current is not None and message.step < self.current:  # the input box stood in for it
+                self._dirty = message.step if self._dirty is None else min(self._dirty, message.step)
         elif step.input.u != message.u:
             about: About = {"source": message.src, "step": message.step}
             text = f"input of step {message.step} came again from {message.src} with another value; the first counts"
@@ -213,7 +245,7 @@ class Estimator(Node):
 
     def _see(self, k: int, now: int) -> Step | None:
         """The record of step k, or None when it lies before all that is remembered."""
-        if self.current is not None and k < self.current - self.history:
+        if self.current is not None and (k < self.current - self.history or self._is_from_the_future(k, now)):
             return None
         self._heard_at = now
         if k > self._newest:
@@ -225,6 +257,13 @@ class Estimator(Node):
         if len(self._steps) > MOST_STEPS and self.current is None:
             del self._steps[min(self._steps)]
         return step
+
+    def _is_from_the_future(self, k: int, now: int) -> bool:
+        """Whether a step is too far ahead to be true; were it believed, all else would be late."""
+        passed = 0 if self._heard_at is None else max(0, now - self._heard_at)
+        is_ahead = k > self._newest + FURTHEST + int(4 * passed * self.configuration.mesh.rate / SECOND)
+        self._counts["from the future"] += is_ahead
+        return is_ahead
 
     def _is_over(self, k: int) -> bool:
         assert self.current is not None
@@ -239,7 +278,7 @@ class Estimator(Node):
         if self.current is None and not self._start(now):
             return []
         messages: list[Message] = []
-        while True:
+        for _ in range(MOST_AT_ONCE):
             assert self.current is not None
             k = self.current
             step = self._steps.setdefault(k, Step())
@@ -329,7 +368,7 @@ class Estimator(Node):
             elif self.configuration.input_box is not None and self._is_overdue(k, now):
                 u = self.configuration.input_box
             else:
-                self._waiting = f"input of step {k}" if self._newest > k else ""
+                self._waiting = f"input of step {k} ({self._input_key()})" if self._newest > k else ""
                 return False
         self._waiting = ""
         if step.input is not None:
@@ -338,7 +377,7 @@ class Estimator(Node):
         if not self._predict_set(k, u, now):
             return False
         self.current, self._combined = k + 1, False
-        self._steps.pop(k - self.history, None)  # one step forward, one is forgotten: never a search of the backlog
+        self._steps.pop(k - self.remembered, None)  # one step forward, one is forgotten: never a search of the backlog
         del self._signs[: bisect_left(self._signs, (k + 1 - self.history,))]
         return True
 
@@ -484,6 +523,27 @@ class Estimator(Node):
 
     def waiting_for(self) -> str:
         return self._waiting
+
+    def _input_key(self) -> str:
+        plant = self.configuration.plant
+        return key(self.configuration.mesh.name, "input", plant.name if plant is not None else "*")
+
+    def complaints(self, now: int) -> list[Complaint]:
+        """As of every node, and which sources have fallen silent."""
+        found = super().complaints(now)
+        if self._first_evidence is None or self._has_ended():
+            return found
+        for topic, name in self.subscriptions():
+            silence = self._silences.get(name, Silence(self._first_evidence))
+            if name in self.sources and silence.is_strange(now):
+                address = key(self.configuration.mesh.name, topic, name)
+                found.append(Complaint("WARN", f"nothing from {address} for {(now - silence.since) / SECOND:.0f} s"))
+        return found
+
+    def _has_ended(self) -> bool:
+        """Whether the last step of the mesh is there, after which nobody has anything to say."""
+        last = self.configuration.mesh.steps
+        return last is not None and self._newest >= last
 
     def counters(self) -> dict[str, float]:
         return self._counts | {"epoch": self.epochs.number, "newest": self._newest}

@@ -106,6 +106,11 @@ class FilterNode(Estimator):
     def history(self) -> int:
         return self.settings.history
 
+    @property
+    def remembered(self) -> int:
+        """A step that is done again may carry a fused box on that was old already when the step was first done."""
+        return self.history + OLDEST_BOX
+
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return subscriptions(self.configuration, self.role, self.name)
 

@@ -8,16 +8,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from msgspec import structs
 
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Fused, Health, Input, Message, Posterior, Rejection, SupportMessage
+from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
 from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Combined, Estimator, Status, Step, finite_or_none
-from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.nodes.node import SECOND, Complaint
 from lsu_mesh.mesh.nodes.quarantine import Quarantine, Say
 from lsu_mesh.mesh.nodes.transfer import SOUND
 from lsu_mesh.mesh.sets import to_support
@@ -329,13 +328,10 @@ class FusionNode(Estimator):
 
         return say
 
-    def health(self, now: int) -> Health:
-        """How the fusion does now; names who is quarantined."""
-        health = super().health(now)
-        if not self._quarantine.members:
-            return health
-        reasons = [*health.reasons, f"quarantined: {', '.join(sorted(self._quarantine.members))}"]
-        return structs.replace(health, level="WARN", reasons=reasons)
+    def complaints(self, now: int) -> list[Complaint]:
+        """As of every estimator, and who is quarantined."""
+        names = ", ".join(sorted(self._quarantine.members))
+        return super().complaints(now) + ([Complaint("WARN", f"quarantined: {names}")] if names else [])
 
     # -- messages out
 

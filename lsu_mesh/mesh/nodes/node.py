@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.gate import Gate
@@ -15,6 +15,17 @@ from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import VERSION, Event, Health, Message
 
 SECOND = 1_000_000_000
+REMEMBERED_NS = 5 * SECOND
+"""So long an event or a refusal colours the health."""
+PATIENCE_NS, LONG_NS = SECOND // 2, 5 * SECOND
+"""A wait that is longer is a warning, or an error."""
+
+
+class Complaint(NamedTuple):
+    """A reason why a node is not well, and how bad it is: WARN or ERROR."""
+
+    level: str
+    text: str
 
 
 class Node(ABC):
@@ -43,8 +54,13 @@ class Node(ABC):
         self._digest = configuration.digest()
         self._sequences: dict[str, int] = {}
         self._next_health = 0
-        self._warnings: dict[str, int] = {}
-        self._links = 0
+        self._warnings: dict[tuple[str, str], int] = {}
+        """When an event of a level and code was last told."""
+        self._refused_before = 0
+        self._refused_at: int | None = None
+        self._waiting_since: int | None = None
+        self.gauges: dict[str, float] = {"links": 0.0}
+        """What the service around the node measures: links, queue, dropped, step_ms; told with the counters."""
         self.gate = Gate(configuration, {*(topic for topic, _ in self.subscriptions()), *self.answers})
 
     @abstractmethod
@@ -67,6 +83,7 @@ class Node(ABC):
     def tick(self, now: int) -> list[Message]:
         """:meth:`advance`, and a health message once a second."""
         messages = self.advance(now)
+        self._waited(now)
         if now >= self._next_health:
             self._next_health = now + SECOND
             messages.append(self.health(now))
@@ -78,7 +95,7 @@ class Node(ABC):
 
     def note_links(self, count: int) -> None:
         """How many peers and routers the process is connected to; the next tick tells."""
-        self._links = count
+        self.gauges["links"] = float(count)
         self._next_health = 0
 
     def wakeup(self) -> int | None:
@@ -132,22 +149,44 @@ class Node(ABC):
     ) -> Event:
         """A message for people; WARN and ERROR also colour the health of the next seconds."""
         if level != "INFO":
-            self._warnings[code] = now
+            self._warnings[level, code] = now
         return Event(**self.stamp("event", step, now), level=level, code=code, text=text, about=about)  # type: ignore[arg-type]
 
     def health(self, now: int) -> Health:
-        """How the node does now."""
-        reasons = [f"{code}: in the last 5 s" for code, at in self._warnings.items() if now - at < 5 * SECOND]
-        waiting = self.waiting_for()
-        if waiting:
-            reasons.append(f"waiting for {waiting}")
-        if self.gate.refused:
-            reasons.append(f"refused {self.gate.refused.total()} message(s), last: {self.gate.last_refusal}")
-        counters = self.gate.counters | self.counters() | {"links": float(self._links)}
+        """How the node does now: the worst of its complaints is its level."""
+        complaints = self.complaints(now)
+        levels = {complaint.level for complaint in complaints}
         return Health(
             **self.stamp("health", self.step(), now),
             role=self.role,
-            level="WARN" if reasons else "OK",
-            reasons=reasons,
-            counters=counters,
+            level="ERROR" if "ERROR" in levels else "WARN" if levels else "OK",
+            reasons=[complaint.text for complaint in complaints],
+            counters=self.gate.counters | self.counters() | self.gauges,
         )
+
+    def complaints(self, now: int) -> list[Complaint]:
+        """What is not as it should be: events and refusals of the last seconds, and what is waited for."""
+        found = [
+            Complaint(level, f"{code}: in the last 5 s")
+            for (level, code), at in self._warnings.items()
+            if now - at < REMEMBERED_NS
+        ]
+        waited = self._waited(now)
+        if waited > PATIENCE_NS:
+            level = "ERROR" if waited > LONG_NS else "WARN"
+            found.append(Complaint(level, f"waiting for {self.waiting_for()} for {waited / SECOND:.1f} s"))
+        refused = self.gate.refused.total()
+        if refused > self._refused_before:
+            self._refused_before, self._refused_at = refused, now
+        if self._refused_at is not None and now - self._refused_at < REMEMBERED_NS:
+            found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {self.gate.last_refusal}"))
+        return found
+
+    def _waited(self, now: int) -> int:
+        """For how long the node has been waiting, in nanoseconds; it looks at each tick."""
+        if not self.waiting_for():
+            self._waiting_since = None
+            return 0
+        if self._waiting_since is None:
+            self._waiting_since = now
+        return now - self._waiting_since

@@ -1,0 +1,106 @@
+"""How a whole mesh does, as somebody sees it who hears its health messages: worst wins, and silence is an answer.
+
+A peer says OK, WARN or ERROR of itself. STALE is what others say of it: its heartbeats have stopped, or it never came.
+A heartbeat proves that a peer computes; liveliness proves only that its process is connected.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.messages import Health
+from lsu_mesh.mesh.nodes.node import SECOND
+
+Level = Literal["OK", "WARN", "ERROR", "STALE"]
+LEVELS: tuple[Level, ...] = ("OK", "WARN", "ERROR", "STALE")
+"""From best to worst."""
+STALE_NS = 3 * SECOND
+"""A peer that has sent no heartbeat for so long, three times its period, is stale."""
+
+
+@dataclass(frozen=True)
+class PeerHealth:
+    """How one peer does."""
+
+    name: str
+    role: str
+    level: Level
+    reasons: tuple[str, ...] = ()
+    step: int = 0
+    age_ns: int | None = None
+    """Since the last heartbeat; None where none ever came."""
+    counters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass
+class _Heard:
+    message: Health
+    at: int
+
+
+class HealthObserver:
+    """Collects heartbeats and liveliness; :meth:`peers` judges at a time of the observer's own clock.
+
+    Parameters
+    ----------
+    configuration:
+        Its peers are expected; others that are heard are listed too.
+    now:
+        When the observer begins to listen; a peer gets ``STALE_NS`` from then on to be heard.
+    """
+
+    def __init__(self, configuration: Configuration, now: int) -> None:
+        self._roles = {name: role for role, name in configuration.peers()}
+        self._began = now
+        self._heard: dict[str, _Heard] = {}
+        self._gone: set[str] = set()
+
+    def note(self, message: Health, now: int) -> None:
+        """A heartbeat; one of an earlier life that comes late does not count."""
+        known = self._heard.get(message.name)
+        if known is not None:
+            before = known.message
+            is_older = message.seq <= before.seq if message.boot == before.boot else message.sent_ns < before.sent_ns
+            if is_older:
+                return
+        self._heard[message.name] = _Heard(message, now)
+
+    def note_presence(self, name: str, is_there: bool) -> None:
+        """Liveliness of a peer."""
+        if is_there:
+            self._gone.discard(name)
+        else:
+            self._gone.add(name)
+
+    def peers(self, now: int) -> list[PeerHealth]:
+        """Every peer, in the configuration's order, then others by name."""
+        names = [*self._roles, *sorted(set(self._heard) - set(self._roles))]
+        return [self._judged(name, now) for name in names]
+
+    def level(self, now: int) -> Level:
+        """The worst level of all peers."""
+        return worst([peer.level for peer in self.peers(now)])
+
+    def _judged(self, name: str, now: int) -> PeerHealth:
+        heard = self._heard.get(name)
+        if heard is None:
+            waited = now - self._began
+            is_late = waited >= STALE_NS or name in self._gone
+            reason = f"no heartbeat in {waited / SECOND:.1f} s" if name not in self._gone else "left the mesh"
+            return PeerHealth(name, self._roles[name], "STALE" if is_late else "WARN", (reason,))
+        message, age = heard.message, now - heard.at
+        level: Level = message.level
+        reasons = tuple(message.reasons)
+        if name in self._gone:
+            level, reasons = "STALE", ("left the mesh", *reasons)
+        elif age >= STALE_NS:
+            level, reasons = "STALE", (f"no heartbeat for {age / SECOND:.1f} s", *reasons)
+        return PeerHealth(name, message.role, level, reasons, message.step, age, message.counters)
+
+
+def worst(levels: Sequence[Level]) -> Level:
+    """The worst of some levels; OK of none."""
+    return max(levels, key=LEVELS.index, default="OK")

@@ -1,0 +1,125 @@
+"""One seed: draw the mesh and its faults, run them, and compare the end with a run in which nothing went wrong."""
+
+from __future__ import annotations
+
+import functools
+import random
+import traceback
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.messages import Posterior
+from lsu_mesh.mesh.simulator.broken import InvariantBroken
+from lsu_mesh.mesh.simulator.faults import FaultPlan, draw_plan
+from lsu_mesh.mesh.simulator.mesh import SimulatedMesh
+from lsu_mesh.mesh.simulator.variants import Variant, configured, draw_variant
+from lsu_mesh.mesh.simulator.witness import Witness
+from lsu_mesh.simulation import input_at, next_state, random_uniform
+
+TRAJECTORIES = 4
+"""So many different trajectories of the plant; the fault-free run of each is kept."""
+RECOVERY_STEPS = 100
+"""So many steps (5 s) after the last fault the mesh is as if nothing had been."""
+JUDGED_STEPS = 20
+"""The steps after those, the last of a run, in which it is judged."""
+WIDEST, WIDEST_SMALL = 1.05, 1.5
+"""A fused set may then be so much wider than without faults: in the mesh as it is, and with small constrained
+zonotopes, whose size hangs on what was reduced when, for as long as anything of it is remembered."""
+AFTERMATH = 10
+"""Steps of time after the last step, in which deadlines pass."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one seed."""
+
+    seed: int
+    steps: int
+    broken: str = ""
+    """The invariant that was broken, and how; empty when all held."""
+    sets: int = 0
+    """Sets that were checked."""
+    counts: dict[str, int] = field(default_factory=dict)
+    """Faults that happened, by kind."""
+    variant: str = ""
+
+
+def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outcome:
+    """Simulate one seed."""
+    rng = random.Random(seed)
+    base = configured(file, steps, 0, Variant())
+    variant = draw_variant(rng, base)
+    trajectory = rng.randrange(TRAJECTORIES)
+    configuration = configured(file, steps, trajectory, variant)
+    witness = Witness(configuration, true_states(configuration, steps + AFTERMATH))
+    last_faulty = max(steps // 2, steps - RECOVERY_STEPS - JUDGED_STEPS)
+    begin, end = (SimulatedMesh.start_time(configuration, step) for step in (0, last_faulty))
+    plan = draw_plan(rng, faults, configuration.peers(), begin, end)
+    mesh = SimulatedMesh(configuration, plan, rng, witness)
+    broken = ""
+    try:
+        mesh.run(steps + AFTERMATH)
+        if steps - last_faulty >= RECOVERY_STEPS + JUDGED_STEPS:
+            widths = fault_free_widths(file, steps, trajectory, variant)
+            _check_end(configuration, witness, widths, WIDEST_SMALL if variant.kinds else WIDEST)
+    except InvariantBroken as error:
+        broken = str(error)
+    except Exception as error:  # a node that dies of a message is a finding, not the end of the campaign
+        broken = f"crash: {type(error).__name__}: {error}\n{traceback.format_exc(limit=-4)}"
+    counts = mesh.transport.counts | {
+        "partition": len(plan.partitions), "freeze": len(plan.freezes), "kill": len(plan.kills),
+        "skew": len(plan.skews),
+    }  # fmt: skip
+    return Outcome(seed, steps, broken, witness.sets, counts, str(variant))
+
+
+@functools.lru_cache(maxsize=512)
+def fault_free_widths(file: Path, steps: int, trajectory: int, variant: Variant) -> dict[str, float]:
+    """Mean width of each estimator's judged sets when nothing goes wrong."""
+    configuration = configured(file, steps, trajectory, variant)
+    witness = Witness(configuration, true_states(configuration, steps + AFTERMATH))
+    SimulatedMesh(configuration, FaultPlan(0), random.Random(0), witness).run(steps + AFTERMATH)
+    return {name: judged_width(name, newest, steps) for name, newest in witness.newest.items()}
+
+
+def true_states(configuration: Configuration, steps: int) -> NDArray[np.float64]:
+    """What the plant of a configuration does, (steps, n)."""
+    plant, model, seed = configuration.plant, configuration.base_model, configuration.mesh.seed
+    assert plant is not None
+    x = np.array(plant.x1 if plant.x1 is not None else configuration.prior.center, dtype=np.float64)
+    X = np.empty((steps, model.state_count))
+    for k in range(1, steps + 1):
+        X[k - 1] = x
+        u = input_at(plant.inputs, seed, k, model.input_count, f"{plant.name}/input")
+        x = next_state(model, x, u, random_uniform(seed, f"{plant.name}/process", k, model.rho.size))
+    return X
+
+
+def judged_width(name: str, newest: dict[int, Posterior], steps: int) -> float:
+    """Mean width of the bounds over the judged steps."""
+    widths = []
+    for k in range(steps - JUDGED_STEPS + 1, steps + 1):
+        if k not in newest:
+            raise InvariantBroken("recovery", f"{name} has published no step {k}")
+        widths.append(np.mean(np.subtract(newest[k].upper, newest[k].lower)))
+    return float(np.mean(widths))
+
+
+def _check_end(configuration: Configuration, witness: Witness, widths: dict[str, float], widest: float) -> None:
+    """Healthy, complete, and as narrow as without faults."""
+    for _, name in configuration.peers():
+        health = witness.health.get(name)
+        if health is None or health.level != "OK":
+            words = "is not there" if health is None else f"is {health.level}: {'; '.join(health.reasons)}"
+            raise InvariantBroken("health", f"{name} {words} in the end")
+    for name, expected in widths.items():
+        found = judged_width(name, witness.newest.get(name, {}), int(configuration.mesh.steps or 0))
+        if name in configuration.fusion and found > widest * expected:
+            raise InvariantBroken(
+                "recovery", f"{name} has mean width {found:.6g} in the end, without faults {expected:.6g}"
+            )

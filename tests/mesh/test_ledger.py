@@ -1,0 +1,62 @@
+"""Up to the flushed number nothing is missing, whatever order things come in."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lsu_mesh.mesh.ledger import WINDOW, Ledger
+
+A, B = "a" * 16, "b" * 16
+
+
+@given(st.lists(st.integers(0, 40), min_size=1, max_size=80))
+def test_everything_from_the_first_to_the_flushed_number_has_come(numbers: list[int]) -> None:
+    ledger = Ledger()
+    for count, number in enumerate(numbers, start=1):
+        ledger.note("key", A, number)
+        ledger.flush()
+        expected = numbers[0]
+        while expected + 1 in numbers[:count]:
+            expected += 1
+        assert ledger.flushed == {"key": expected}
+        assert ledger.lost == {"key": []}
+
+
+def test_nothing_is_flushed_before_it_is_flushed() -> None:
+    ledger = Ledger()
+    ledger.note("key", A, 0)
+    assert ledger.flushed == {}
+    ledger.flush()
+    ledger.note("key", A, 1)
+    assert ledger.flushed == {"key": 0}
+
+
+def test_a_number_that_never_comes_is_given_up_and_counted() -> None:
+    ledger = Ledger()
+    ledger.note("key", A, 0)
+    for number in range(2, WINDOW + 3):
+        ledger.note("key", A, number)
+    ledger.flush()
+    assert ledger.flushed == {"key": WINDOW + 2}
+    assert ledger.lost == {"key": [(1, 1)]}
+    assert ledger.is_lost("key", 1)
+
+
+def test_a_monstrous_number_costs_nothing() -> None:
+    ledger = Ledger()
+    for number in (0, 2**62, 5, 2**63 - 1):
+        ledger.note("key", A, number)
+    ledger.flush()
+    assert ledger.flushed == {"key": 2**63 - 1}
+    assert ledger.lost == {"key": [(1, 2**62 - 1), (2**62 + 1, 2**63 - 2)]}
+
+
+def test_a_new_life_counts_anew_and_stragglers_of_the_old_one_change_nothing() -> None:
+    ledger = Ledger()
+    ledger.note("key", A, 7)
+    ledger.note("key", B, 0)
+    ledger.note("key", A, 8)
+    ledger.note("key", B, 1)
+    ledger.flush()
+    assert (ledger.flushed, ledger.boots, ledger.first) == ({"key": 1}, {"key": B}, {"key": 0})
