@@ -9,7 +9,8 @@ import pytest
 
 from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.messages import Posterior
-from lsu_mesh.mesh.nodes.estimator import Base, Estimator
+from lsu_mesh.mesh.nodes.estimator import Estimator
+from lsu_mesh.mesh.nodes.step import Base
 from lsu_mesh.mesh.simulator import run
 from lsu_mesh.mesh.simulator.faults import FAULTS, parse_faults
 from lsu_mesh.mesh.simulator.run import Outcome, run_seed

@@ -10,18 +10,15 @@ import math
 from abc import abstractmethod
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple
+from dataclasses import replace
 
 import numpy as np
 
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import (
     Bounds,
-    Fused,
     Guarantee,
     Input,
     Message,
@@ -33,17 +30,15 @@ from lsu_mesh.mesh.messages import (
 from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.reach import Reach
+from lsu_mesh.mesh.nodes.silence import Silences, input_key
+from lsu_mesh.mesh.nodes.step import Base, Combined, Step
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
 
-Base = Reference | Literal["prior", "reach", "domain", "sources"]
 About = dict[str, str | int | float | None]
-Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 START_GRACE = SECOND // 2
 """How long a late joiner listens to the past before it chooses where to start."""
-STRANGE_SILENCE = 2 * SECOND
-"""A source that says nothing for longer, and for longer than usual, is complained of."""
 REHEARSED_STEPS = 6
 """So many steps bring a limited complexity into play."""
 BEHIND = 32
@@ -58,55 +53,6 @@ FURTHEST = 4096
 """So many steps, and four times those that the rate allows since the last message, a message may lie ahead."""
 MOST_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
-
-
-@dataclass
-class Step:
-    """What is known of one step."""
-
-    arrived: dict[str, Message] = field(default_factory=dict)
-    """Newest message of each source."""
-    input: Input | None = None
-    before: object | None = None
-    """The set before the step's data, for rewinding."""
-    reach: object | None = None
-    """The prior carried to the step."""
-    base: Base = "prior"
-    used_before: tuple[Reference, ...] = ()
-    """Base of ``before`` and what was used since."""
-    transfers: Sequence[Prediction | Fused] | None = None
-    """Transfers used when the step was first closed; a replay uses the same."""
-    closed: bool = False
-    """Whether its data were combined once; they are never waited for again."""
-    revision: int = -1
-    published: Posterior | None = None
-
-
-class Silence(NamedTuple):
-    """Since when a source has said nothing, and the longest that it ever said nothing."""
-
-    since: int
-    longest: int = 0
-
-    def heard(self, now: int) -> Silence:
-        """After one more message."""
-        return Silence(now, max(self.longest, now - self.since))
-
-    def is_strange(self, now: int) -> bool:
-        """Whether it is silent for much longer than it ever was."""
-        return now - self.since > max(STRANGE_SILENCE, 4 * self.longest)
-
-
-@dataclass(frozen=True)
-class Combined:
-    """Outcome of one step's data."""
-
-    status: Status
-    used: Sequence[Reference]
-    missing: Sequence[str]
-    origin: int | None
-    cause: str | None = None
-    gain: float | None = None
 
 
 WEAKNESS: tuple[Guarantee, ...] = ("declared", "learned", "none")
@@ -129,8 +75,7 @@ class Estimator(Node):
         self._newest = 0
         self._signs: list[tuple[int, int]] = []
         """Each step that was the newest when it was first heard of, and when that was; both rise."""
-        self._silences: dict[str, Silence] = {}
-        """When each source was heard last."""
+        self._silences = Silences(configuration, self.subscriptions(), sources)
         self._heard_at: int | None = None
         """When the last message came, of whatever step."""
         self._first_evidence: int | None = None
@@ -194,7 +139,7 @@ class Estimator(Node):
 
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""
-        self._silences[source] = self._silences.get(source, Silence(now)).heard(now)
+        self._silences.heard(source, now)
         step = self._see(message.step, now)
         if step is None:
             self._counts["late"] += 1
@@ -368,7 +313,7 @@ class Estimator(Node):
             elif self.configuration.input_box is not None and self._is_overdue(k, now):
                 u = self.configuration.input_box
             else:
-                self._waiting = f"input of step {k} ({self._input_key()})" if self._newest > k else ""
+                self._waiting = f"input of step {k} ({input_key(self.configuration)})" if self._newest > k else ""
                 return False
         self._waiting = ""
         if step.input is not None:
@@ -524,26 +469,12 @@ class Estimator(Node):
     def waiting_for(self) -> str:
         return self._waiting
 
-    def _input_key(self) -> str:
-        plant = self.configuration.plant
-        return key(self.configuration.mesh.name, "input", plant.name if plant is not None else "*")
-
     def complaints(self, now: int) -> list[Complaint]:
         """As of every node, and which sources have fallen silent."""
-        found = super().complaints(now)
-        if self._first_evidence is None or self._has_ended():
-            return found
-        for topic, name in self.subscriptions():
-            silence = self._silences.get(name, Silence(self._first_evidence))
-            if name in self.sources and silence.is_strange(now):
-                address = key(self.configuration.mesh.name, topic, name)
-                found.append(Complaint("WARN", f"nothing from {address} for {(now - silence.since) / SECOND:.0f} s"))
-        return found
-
-    def _has_ended(self) -> bool:
-        """Whether the last step of the mesh is there, after which nobody has anything to say."""
         last = self.configuration.mesh.steps
-        return last is not None and self._newest >= last
+        has_ended = last is not None and self._newest >= last  # nobody has anything to say any more
+        is_early = self._first_evidence is None
+        return super().complaints(now) + ([] if has_ended or is_early else self._silences.complaints(now))
 
     def counters(self) -> dict[str, float]:
         return self._counts | {"epoch": self.epochs.number, "newest": self._newest}

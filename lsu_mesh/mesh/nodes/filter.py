@@ -25,8 +25,9 @@ from lsu_mesh.mesh.messages import (
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.contradiction import Dropped, update_without_contradicting_strips, widen
-from lsu_mesh.mesh.nodes.estimator import About, Base, Combined, Estimator, Status, Step, finite_or_none
+from lsu_mesh.mesh.nodes.estimator import About, Estimator, finite_or_none
 from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.nodes.step import Base, Combined, Status, Step
 from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, SOUND, Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope

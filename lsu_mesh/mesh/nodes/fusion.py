@@ -15,9 +15,10 @@ from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
-from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Combined, Estimator, Status, Step, finite_or_none
+from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator, finite_or_none
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint
 from lsu_mesh.mesh.nodes.quarantine import Quarantine, Say
+from lsu_mesh.mesh.nodes.step import Combined, Status, Step
 from lsu_mesh.mesh.nodes.transfer import SOUND
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.orthotope import Orthotope

@@ -1,0 +1,46 @@
+"""What an estimator knows of one step, and what came of its data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Prediction, Reference
+
+Base = Reference | Literal["prior", "reach", "domain", "sources"]
+Status = Literal["ok", "predicted", "inconsistent", "restarted"]
+
+
+@dataclass
+class Step:
+    """What is known of one step."""
+
+    arrived: dict[str, Message] = field(default_factory=dict)
+    """Newest message of each source."""
+    input: Input | None = None
+    before: object | None = None
+    """The set before the step's data, for rewinding."""
+    reach: object | None = None
+    """The prior carried to the step."""
+    base: Base = "prior"
+    used_before: tuple[Reference, ...] = ()
+    """Base of ``before`` and what was used since."""
+    transfers: Sequence[Prediction | Fused] | None = None
+    """Transfers used when the step was first closed; a replay uses the same."""
+    closed: bool = False
+    """Whether its data were combined once; they are never waited for again."""
+    revision: int = -1
+    published: Posterior | None = None
+
+
+@dataclass(frozen=True)
+class Combined:
+    """Outcome of one step's data."""
+
+    status: Status
+    used: Sequence[Reference]
+    missing: Sequence[str]
+    origin: int | None
+    cause: str | None = None
+    gain: float | None = None
