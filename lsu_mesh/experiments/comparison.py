@@ -7,6 +7,7 @@ reproduced`` ends with the reason.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -37,7 +38,7 @@ def compared(
     ``trend``: whether the paper's statement holds here, or None where it states nothing about this number. ``why``
     explains a deviation; it is not printed where there is none.
     """
-    measured = here if isinstance(here, Spread) else Spread(here, 0.0)
+    measured = here if isinstance(here, Spread) else Spread(here, math.nan)
     return Row(labels, paper, here, _verdict(paper, measured, trend, why))
 
 
@@ -77,7 +78,8 @@ def count(tables: Iterable[Table]) -> dict[str, int]:
 
 def _verdict(paper: float, here: Spread, trend: bool | None, why: str) -> str:
     distance = abs(here.mean - paper)
-    if distance <= max(DEVIATIONS * here.sd, SHARE * abs(paper)):
+    deviation = 0.0 if math.isnan(here.sd) else here.sd
+    if distance <= max(DEVIATIONS * deviation, SHARE * abs(paper)):
         return REPRODUCED
     ratio = here.mean / paper if paper else 0.0
     size = f"{ratio:.2g} × the paper's" if 1e-3 < ratio < 1e3 else f"{here.mean:.2g} instead of {paper:g}"

@@ -43,6 +43,12 @@ KINDS: Mapping[str, Make] = {
 FEEDBACKS = ("none", "next step", "same step")
 WARM_UP = 10
 """Steps that are not counted, but for containment."""
+TITLE = "Fusion of three filters on P3 and Bayesian transfer, experiments of this library"
+NOTES = (
+    "P3 with one filter per sensor: each alone, their fusion with and without feedback, and the filter of the same "
+    "class that has all sensors (*central*). Below it, transfer of a source's prediction to a target over the noise of "
+    "the source, after Kuklišová Pavelková, Jirsa, Quinn (2022)."
+)
 VOLUME_EVERY = 5
 """The volume of the fused support, an exact polytope, is measured at every fifth step."""
 
@@ -72,7 +78,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     ways = [(kind, way) for kind in KINDS for way in FEEDBACKS]
     counts = spread(partial(_tally_of, seeds=seeds, steps=steps), ways, watch)
     tallies = dict(zip(ways, counts, strict=True))
-    return Outcome([_table(tallies, len(seeds), steps)], _checks(tallies), {})
+    return Outcome([_table(tallies, len(seeds), steps)], _checks(tallies), {}, TITLE, NOTES)
 
 
 def _tally_of(way: tuple[str, str], seeds: range, steps: int) -> Tally:

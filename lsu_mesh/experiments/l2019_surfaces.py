@@ -67,7 +67,8 @@ class Surfaces:
         for name, criterion in rows[0]:
             stack = np.array([row[name, criterion] for row in rows])
             self.mean[system, name, criterion] = stack.mean(axis=2)
-            self.sd[system, name, criterion] = stack.std(axis=2, ddof=1) if stack.shape[2] > 1 else 0.0 * stack[:, :, 0]
+            alone = np.full(stack.shape[:2], np.nan)
+            self.sd[system, name, criterion] = stack.std(axis=2, ddof=1) if stack.shape[2] > 1 else alone
 
     def of(self, system: str, paper_name: str) -> Matrix:
         """The surface (rho levels, r levels) of the report's criterion."""

@@ -24,21 +24,22 @@ ROUNDING = 1e-12
 
 
 class Spread(NamedTuple):
-    """A number measured in several runs: mean and standard deviation over the runs."""
+    """A number measured in several runs: mean, and standard deviation over the runs (NaN where there is but one)."""
 
     mean: float
     sd: float
 
     @classmethod
     def of(cls, values: ArrayLike) -> Spread:
-        """Mean and standard deviation (n − 1) of one number per run; 0 for a single run, and for mere rounding."""
+        """Mean and standard deviation (n − 1) of one number per run; a deviation that is mere rounding is 0."""
         runs = np.asarray(values, dtype=np.float64).ravel()
-        sd = float(runs.std(ddof=1)) if runs.size > 1 else 0.0
-        return cls(float(runs.mean()), sd if sd > ROUNDING * float(np.abs(runs).max()) else 0.0)
+        sd = float(runs.std(ddof=1)) if runs.size > 1 else math.nan
+        return cls(float(runs.mean()), 0.0 if sd <= ROUNDING * float(np.abs(runs).max()) else sd)
 
     def printed(self, form: str) -> str:
-        """``mean ± sd``, the standard deviation with two digits."""
-        return f"{_text(self.mean, form)} ± {_text(self.sd, '.2g')}"
+        """``mean ± sd``, the standard deviation with two digits; the number alone where there is one run."""
+        mean = _text(self.mean, form)
+        return mean if math.isnan(self.sd) else f"{mean} ± {_text(self.sd, '.2g')}"
 
 
 Cell = str | int | float | Spread

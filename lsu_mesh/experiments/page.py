@@ -44,7 +44,7 @@ def _summary(outcomes: Mapping[str, Outcome]) -> str:
 
 
 def _section(what: str, outcome: Outcome, folder: str) -> Iterator[str]:
-    yield f"## {what}" + (f"\n**{outcome.title}.**" if outcome.title else "")
+    yield f"## {what}" + (f"\n**{outcome.title.rstrip('.')}.**" if outcome.title else "")
     if outcome.notes:
         yield outcome.notes
     for table in outcome.tables:

@@ -51,6 +51,7 @@ SHOWN_RATIOS = RATIOS[[0, 4, 5, 6, 8, 12]]
 """Those of the printed table, and all there are in a quick run."""
 WAYS = ("predictor", "data-predictor")
 WELL_BELOW = 0.7
+CAPTION = "Transfer against the source's noise: solid lines are the state predictor, dashed ones the data predictor"
 
 
 @dataclass
@@ -118,7 +119,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     if not quick:
         shown = [point for point in results if point.ratio in SHOWN_RATIOS]
         tables = [_table("transfer", shown, len(seeds), steps), _table("transfer-curves", results, len(seeds), steps)]
-    return Outcome(tables, _checks(results), {"transfer": draw})
+    return Outcome(tables, _checks(results), {"transfer": draw}, captions={"transfer": CAPTION})
 
 
 def _result_at(point: tuple[str, str, str, float], seeds: range, steps: int) -> Result:

@@ -50,4 +50,5 @@ def test_the_table_and_its_count() -> None:
 
 def test_the_deviation_is_that_of_a_single_run() -> None:
     assert Spread.of([1.0, 3.0]) == Spread(2.0, pytest.approx(2.0**0.5))
-    assert Spread.of([1.0]) == Spread(1.0, 0.0)
+    assert Spread.of([0.1, 0.1, 0.1]).sd == 0.0
+    assert Spread.of([1.0]).printed(".3g") == "1"
