@@ -159,9 +159,9 @@ def _why(column: str, i: int) -> str:
     if STATISTICS[i].startswith("median (") or STATISTICS[i].startswith("median half"):
         return "one run in the paper"
     if column == "LSU" and STATISTICS[i].startswith("std (ŷ"):
-        return "every strip tightens all others here, which moves the centre off the measured outputs"
+        return "here a new strip that reaches out of the box is tightened, which moves the centre off y"
     if column == "ZKF q=3":
-        return "a box of the shortest generators that keeps the guarantee has less error than one that does not"
+        return "the paper does not describe its reduction to three generators; the one here keeps the guarantee"
     return "one run and another prior in the paper"
 
 

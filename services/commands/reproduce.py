@@ -17,7 +17,7 @@ from lsu_mesh.experiments.outcome import Outcome, Table
 from lsu_mesh.experiments.page import page
 from lsu_mesh.experiments.workers import Watch, part, shared_processes
 from services.arguments.reproduce import ALL, REPRODUCIBLE, WITH_BENCHMARKS
-from services.cli import COULD_NOT_START, NOT_MET, OK, USAGE
+from services.cli import COULD_NOT_START, FAILURE, NOT_MET, OK, USAGE
 from services.progress import ShareDone
 
 if TYPE_CHECKING:
@@ -45,20 +45,25 @@ def main(options: argparse.Namespace) -> int:
     except OSError as error:
         print(f"{files}: cannot be made: {error.strerror}", file=sys.stderr)
         return USAGE
-    outcomes = {}
+    outcomes: dict[str, list[Outcome]] = {}
+    failed: list[str] = []
     with shared_processes():
         for what in _chosen(options):
             try:
                 outcomes[what] = _run(what, options)
             except LsuMeshError as error:
                 print(f"{what}: {error}", file=sys.stderr)
-                return COULD_NOT_START
+                failed.append(what)
+                continue
             for outcome in outcomes[what]:
                 _print_json(outcome) if options.json else _print_tables(outcome)
                 for path in () if files is None else _write(outcome, files):
                     print(f"wrote {path}", file=sys.stderr)
     if folder is not None and options.what == ALL:
         _write_page({what: _joined(parts) for what, parts in outcomes.items()}, folder, options)
+    if failed:
+        print(f"not done: {', '.join(failed)}", file=sys.stderr)
+        return FAILURE
     are_met = all(check.is_met for parts in outcomes.values() for outcome in parts for check in outcome.checks)
     return OK if are_met else NOT_MET
 

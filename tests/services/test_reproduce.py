@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from lsu_mesh.errors import ModelError
 from lsu_mesh.experiments import fusion, transfer
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table
 from services import cli
-from services.arguments.reproduce import REPRODUCIBLE
+from services.arguments.reproduce import REPRODUCIBLE, Experiment
 from services.commands import reproduce
 
 
@@ -115,3 +116,19 @@ def test_wrong_arguments_are_refused(arguments: list[str], said: str, capsys: py
     with pytest.raises(SystemExit, match="2"):
         cli.main(["reproduce", *arguments])
     assert said in capsys.readouterr().err
+
+
+def test_an_experiment_that_fails_does_not_stop_the_others(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(quick: bool, seed: int, watch: object) -> Outcome:
+        raise ModelError("no such thing")
+
+    monkeypatch.setattr(reproduce, "REPRODUCIBLE", {name: Experiment("", (name,)) for name in ("transfer", "fusion")})
+    monkeypatch.setattr(transfer, "run", fail)
+    monkeypatch.setattr(fusion, "run", lambda quick, seed, watch: made(2.0))
+    assert cli.main(["reproduce", "all", "--quick"]) == cli.FAILURE
+    shown = capsys.readouterr()
+    assert "met: width = 1.5" in shown.out
+    assert "transfer: no such thing" in shown.err
+    assert "not done: transfer" in shown.err
