@@ -1,4 +1,8 @@
-"""Lanes of status, on change only: of the sets, of the processes, and of the sources in the eyes of the fusion."""
+"""Lanes of status, on change only: of the sets, of the processes, and of the sources in the eyes of the fusion.
+
+A lane tells of the newest step. What is said again of an older one, after something came late, does not change it: the
+lane would go on with that state up to the next change.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +28,7 @@ class StatusLanes:
         self._timelines = timelines
         self._sources = {name: set(fusion.sources) for name, fusion in configuration.fusion.items()}
         self._shown: dict[str, str] = {}
+        self._newest: defaultdict[str, int] = defaultdict(int)
         self._rows: defaultdict[str, list[tuple[Moment, str]]] = defaultdict(list)
         for name in (*configuration.filters, *configuration.fusion):
             self._style(path("status", name), STATUS)
@@ -35,6 +40,9 @@ class StatusLanes:
 
     def add(self, message: Posterior, arrival_ns: int) -> None:
         """Status of a posterior or fused set; of a fused set also the trust in its sources."""
+        if message.step < self._newest[message.name]:
+            return
+        self._newest[message.name] = message.step
         moment = Moment(message.step, arrival_ns)
         self._change(path("status", message.name), moment, message.status)
         if isinstance(message, Fused):

@@ -313,3 +313,36 @@ def test_what_was_relied_on_is_remembered_however_many_boots_come(messages: list
     assert epochs.abandoned is None
     epochs.note(prediction("filter/b", "b" * 16, 2))
     assert epochs.abandoned == "filter/b"
+
+
+# -- what a replay needs
+
+
+def test_a_step_that_is_done_again_finds_the_inputs_by_which_an_old_fused_box_was_carried(
+    four: Callable[..., Any],
+) -> None:
+    """The box used at step 30 is of step 20; the measurement of step 30 comes when only few steps are remembered."""
+    kept: list[tuple[str, bytes]] = []
+
+    def carry(address: str, payload: bytes, node: Any) -> bool:
+        if node.name != "fb":
+            return True
+        message = node.gate.__class__(node.configuration, {"fused", "measurement"}).admit(address, payload)
+        if message is None or not (message.topic == "fused" and 20 < message.step < 40):
+            is_late = message is not None and message.topic == "measurement" and message.step == 30 and not kept
+            if is_late:
+                kept.append((address, payload))
+            return not is_late
+        return False
+
+    mesh = four('filters.fb.transfer="fused"', "filters.fb.history=4", carry=carry)
+    mesh.run(0.635)
+    node = mesh.nodes["fb"]
+    assert node.current is not None
+    assert node.current > 31
+    mesh.publish(node, node.deliver(*kept[0], mesh.now))
+    mesh.run(2.0)
+    again = mesh.newest("fb")[30]
+    assert (again.revision, again.status) == (1, "ok")
+    assert any(topic == "fused" for topic, *_ in again.used)
+    assert max(mesh.newest("fb")) == 120

@@ -141,7 +141,7 @@ def test_a_source_whose_status_is_not_sound_is_ignored(mesh_of: MakeMesh) -> Non
     assert holds_truth(mesh, "main")
 
 
-def test_a_fusion_that_starts_late_starts_from_a_source(mesh_of: MakeMesh) -> None:
+def test_a_fusion_that_starts_late_starts_from_what_its_sources_say_together(mesh_of: MakeMesh) -> None:
     mesh = mesh_of("mesh.steps=100")
     mesh.kill("main")
     mesh.run(1.0)
@@ -149,6 +149,8 @@ def test_a_fusion_that_starts_late_starts_from_a_source(mesh_of: MakeMesh) -> No
     mesh.run(1.5)
     posteriors = mesh.posteriors("main")
     assert posteriors[0].step > 45
-    assert posteriors[0].base[0] == "posterior"
+    assert posteriors[0].base == "sources"
+    assert posteriors[0].status == "restarted"
+    assert {topic for topic, *_ in posteriors[0].used} == {"posterior"}
     assert posteriors[-1].step == 100
     assert holds_truth(mesh, "main")

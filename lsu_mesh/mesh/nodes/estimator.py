@@ -73,6 +73,7 @@ class Estimator(Node):
         """Whether the data of the current step are in the set."""
         self._steps: dict[int, Step] = {}
         self._newest = 0
+        self._newest_input = 0
         self._signs: list[tuple[int, int]] = []
         """Each step that was the newest when it was first heard of, and when that was; both rise."""
         self._silences = Silences(configuration, self.subscriptions(), sources)
@@ -160,6 +161,7 @@ class Estimator(Node):
             return []
         if step.input is None:
             step.input = message
+            self._newest_input = max(self._newest_input, message.step)
             if self.current is not None and message.step < self.current:  # the input box stood in for it
                 self._dirty = message.step if self._dirty is None else min(self._dirty, message.step)
         elif step.input.u != message.u:
@@ -357,8 +359,7 @@ class Estimator(Node):
         """Whether it makes no sense to wait for the input of step k any longer."""
         if self.current is None:
             return False
-        newest = max((j for j, step in self._steps.items() if step.input is not None), default=0)
-        return newest - k > INPUT_LOST or len(self._steps) > MOST_STEPS
+        return self._newest_input - k > INPUT_LOST or len(self._steps) > MOST_STEPS
 
     def _start_over(self, k: int, why: str, now: int) -> None:
         """Nothing is known behind step k: join again there, like a peer that starts late."""

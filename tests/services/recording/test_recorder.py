@@ -177,6 +177,24 @@ def test_status_lanes_change_only_when_the_status_does(configuration: Configurat
     assert [state for _, state in drawn(path, "/health/f1", "StateChange:state")] == [["OK"], ["WARN"]]
 
 
+def test_what_is_said_again_of_an_older_step_does_not_change_the_lane_of_the_newest(
+    configuration: Configuration, record: Record
+) -> None:
+    mesh = MadeUpMesh(configuration)
+    box = Orthotope([-1, -1, -1], [1, 1, 1])
+    sources, rejected = ["f1", "f2", "f3"], [Rejection(source="f2", reason="disjoint")]
+    fused = [
+        mesh.posterior("fusion/main", 1, box, used=sources),
+        mesh.posterior("fusion/main", 2, box, used=["f1", "f3"], rejected=rejected),
+        mesh.posterior("fusion/main", 3, box, used=sources),
+        mesh.posterior("fusion/main", 2, box, used=["f1", "f3"], rejected=rejected, revision=1),
+        mesh.posterior("fusion/main", 4, box, used=["f1", "f3"], rejected=rejected),
+    ]
+    path = record(configuration, [mesh.arrival(m, i + 1, 9) for i, m in enumerate(fused)])
+    lane = drawn(path, "/trust/main/f2", "StateChange:state")
+    assert lane == [(1, ["accepted"]), (2, ["rejected"]), (3, ["accepted"]), (4, ["rejected"])]
+
+
 def test_peers_that_go_are_seen_in_lanes_graph_and_events(configuration: Configuration, tmp_path: Path) -> None:
     path = tmp_path / "x.rrd"
     recorder = Recorder(configuration, path)
