@@ -6,12 +6,25 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 
-from services.arguments import bench, identify, keys, peer, recording, replay, reproduce, run, simulate, validate, view
+from services.arguments import (
+    bench,
+    health,
+    identify,
+    keys,
+    peer,
+    recording,
+    replay,
+    reproduce,
+    run,
+    simulate,
+    validate,
+    view,
+)
 from services.arguments.parsing import EXIT_CODES
 from services.stop import Stop
 
 OK, FAILURE, USAGE, COULD_NOT_START, NOT_MET = 0, 1, 2, 3, 4
-GROUPS = (run, peer, validate, keys, view, replay, recording, simulate, identify, reproduce, bench)
+GROUPS = (run, peer, validate, health, keys, view, replay, recording, simulate, identify, reproduce, bench)
 """In the order of ``lsu-mesh --help``."""
 
 

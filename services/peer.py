@@ -51,6 +51,7 @@ class Peer:
         self._mesh = node.configuration.mesh.name
         self._links = -1
         self._next_look = 0
+        self._measured_until = self._worst_queue = self._worst_ns = 0
         self._recovery = Recovery(node.gate, bus.ask_cache)
 
     def declare(self) -> None:
@@ -96,10 +97,23 @@ class Peer:
         self._watch_links()
         self._recovery.look(self._clock.now())
         arrival = self._bus.next(self._patience())
+        began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
         while arrival is not None:
             self._publish(self._take(arrival))
             arrival = self._bus.next(0)
         self._publish(self._node.tick(self._clock.now()))
+        self._measure(queued, self._clock.now() - began)
+
+    def _measure(self, queued: int, took_ns: int) -> None:
+        """What the next health message tells of the process: the worst since the last one."""
+        if self._node.next_health != self._measured_until:
+            self._measured_until, self._worst_queue, self._worst_ns = self._node.next_health, 0, 0
+        self._worst_queue, self._worst_ns = max(self._worst_queue, queued), max(self._worst_ns, took_ns)
+        self._node.gauges |= {
+            "queue": float(self._worst_queue),
+            "dropped": float(self._bus.dropped),
+            "step_ms": self._worst_ns * 1e-6,
+        }
 
     def _watch_links(self) -> None:
         now = self._clock.now()

@@ -20,5 +20,6 @@ def add(commands: Commands) -> None:
         help="all, none, or some of drop,delay,duplicate,reorder,corrupt,partition,freeze,kill,skew (default: all)",
     )  # fmt: skip
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per processor)")
+    parser.add_argument("--minutes", type=float, metavar="M", help="begin no more seeds after so many minutes")
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout: one per broken seed, and the sum")
     parser.set_defaults(handler="services.commands.simulate")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import sys
 import time
@@ -39,9 +40,15 @@ def main(options: argparse.Namespace) -> int:
     one = options.seed
     seeds = range(options.first, options.first + options.seeds) if one is None else range(one, one + 1)
     tally, began = Tally(), time.monotonic()
-    for outcome in run_seeds(path, seeds, options.steps, faults, options.workers or os.cpu_count() or 1):
-        tally.add(outcome)
-        _tell(outcome, options)
+    end = math.inf if options.minutes is None else began + 60.0 * options.minutes
+    try:
+        for outcome in run_seeds(path, seeds, options.steps, faults, options.workers or os.cpu_count() or 1):
+            tally.add(outcome)
+            _tell(outcome, options)
+            if time.monotonic() > end:
+                break
+    except KeyboardInterrupt:
+        print("stopped; the seeds so far:", file=sys.stderr)
     _sum_up(tally, seeds, time.monotonic() - began, options)
     return NOT_MET if tally.broken else OK
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.ledger import Ledger
 from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Truth
 from services.recording import palette
 from services.recording.estimates import Estimates
@@ -82,8 +83,7 @@ class Recorder:
         timelines = Timelines(configuration.mesh.dt)
         colors = palette.colors(configuration)
         self.path = path
-        self.flushed: dict[str, int] = {}
-        """Per key the last ``seq`` that is known to be in the file."""
+        self._ledger = Ledger()
         self._stream = stream = open_stream(names, path, run_properties, serve_port, continues)
         self._raw = RawStore(stream, timelines)
         self._estimates = Estimates(stream, timelines, names, colors)
@@ -101,9 +101,14 @@ class Recorder:
         self._departures: list[_Presence] = []
         self._broken = ""
         """Why nothing more is recorded, once that is so."""
-        self._unflushed: dict[str, int] = {}
+        self._unflushed: list[tuple[str, str, int]] = []
         self._counts: Counter[str] = Counter()
         self._closed = False
+
+    @property
+    def flushed(self) -> dict[str, int]:
+        """Per key the ``seq`` up to which everything since this recorder's first message of it is in the file."""
+        return self._ledger.flushed
 
     @property
     def problems(self) -> list[str]:
@@ -120,7 +125,7 @@ class Recorder:
             return
         self._raw.add(key, payload, arrival_ns, message)
         if message is not None:
-            self._unflushed[key] = message.seq
+            self._unflushed.append((key, message.boot, message.seq))
             self._guarded(f"drawing {message.topic} of {message.src}", lambda: self._draw(message, arrival_ns))
 
     def peer_changed(self, role: str, name: str, alive: bool, now_ns: int) -> None:
@@ -152,11 +157,13 @@ class Recorder:
             self._guarded(f"drawing {type(part).__name__.lower()}", part.flush)
 
     def _store(self) -> None:
-        unflushed, self._unflushed = self._unflushed, {}
+        unflushed, self._unflushed = self._unflushed, []
         stored = self._guarded("storing raw payloads", self._raw.flush)
         written = self._guarded(f"writing {self.path}", self._write)
         if stored and written and not self._broken:
-            self.flushed |= unflushed
+            for key, boot, seq in unflushed:
+                self._ledger.note(key, boot, seq)
+            self._ledger.flush()
 
     def _write(self) -> None:
         try:

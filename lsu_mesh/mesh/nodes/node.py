@@ -53,7 +53,8 @@ class Node(ABC):
         self.boot = boot
         self._digest = configuration.digest()
         self._sequences: dict[str, int] = {}
-        self._next_health = 0
+        self.next_health = 0
+        """When the next health message is due."""
         self._warnings: dict[tuple[str, str], int] = {}
         """When an event of a level and code was last told."""
         self._refused_before = 0
@@ -84,8 +85,8 @@ class Node(ABC):
         """:meth:`advance`, and a health message once a second."""
         messages = self.advance(now)
         self._waited(now)
-        if now >= self._next_health:
-            self._next_health = now + SECOND
+        if now >= self.next_health:
+            self.next_health = now + SECOND
             messages.append(self.health(now))
         return messages
 
@@ -96,7 +97,7 @@ class Node(ABC):
     def note_links(self, count: int) -> None:
         """How many peers and routers the process is connected to; the next tick tells."""
         self.gauges["links"] = float(count)
-        self._next_health = 0
+        self.next_health = 0
 
     def wakeup(self) -> int | None:
         """When :meth:`tick` has something to do next, apart from health; ``None``: only after a message."""

@@ -1,0 +1,92 @@
+"""``lsu-mesh health``: how each peer of a running mesh does, as one more subscriber sees it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.gate import Gate
+from lsu_mesh.mesh.keys import PREFIX, key, parse
+from lsu_mesh.mesh.messages import Health
+from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
+from services.bus import Arrival, Bus, Clock, NoSession
+from services.cli import COULD_NOT_START, NOT_MET, OK, USAGE
+from services.commands.configuration import load_or_explain, session_settings
+from services.security import InsecureSession
+
+SHOWN = ("received", "gaps", "duplicates", "late", "rewinds", "contradictions", "queue", "step_ms")
+"""Counters with a column of their own; refusals are summed."""
+
+
+def main(options: argparse.Namespace) -> int:
+    configuration = load_or_explain(options.config, options)
+    if configuration is None:
+        return USAGE
+    try:
+        peers = _listen(configuration, options)
+    except (NoSession, InsecureSession) as error:
+        print(error, file=sys.stderr)
+        return COULD_NOT_START
+    print_json(peers) if options.json else print_table(peers)
+    return OK if worst([peer.level for peer in peers]) == "OK" else NOT_MET
+
+
+def _listen(configuration: Configuration, options: argparse.Namespace) -> list[PeerHealth]:
+    """Heartbeats and liveliness of so many seconds, judged at their end."""
+    clock, gate, mesh = Clock(), Gate(configuration, ("health",)), configuration.mesh.name
+    observer = HealthObserver(configuration, clock.now())
+    with Bus(session_settings(configuration, options), clock) as bus:
+        bus.subscribe(f"{PREFIX}/{mesh}/health/*")
+        bus.watch_alive(key(mesh, "live", "*"))
+        end = clock.now() + int(options.seconds * SECOND)
+        while (left := end - clock.now()) > 0:
+            arrival = bus.next(left / SECOND)
+            if arrival is not None:
+                note(observer, gate, arrival)
+        return observer.peers(clock.now())
+
+
+def note(observer: HealthObserver, gate: Gate, arrival: Arrival) -> None:
+    """Tell the observer what has come."""
+    if arrival.what != "sample":
+        address = parse(arrival.key)
+        if address is not None:
+            observer.note_presence(address.name, arrival.what == "alive")
+        return
+    message = gate.admit(arrival.key, arrival.payload)
+    if isinstance(message, Health):
+        observer.note(message, arrival.arrival_ns)
+
+
+def print_json(peers: Sequence[PeerHealth]) -> None:
+    """One line per peer."""
+    for peer in peers:
+        about = {"name": peer.name, "role": peer.role, "level": peer.level, "reasons": list(peer.reasons)}
+        age = None if peer.age_ns is None else peer.age_ns / SECOND
+        print(json.dumps(about | {"step": peer.step, "age_s": age, "counters": dict(peer.counters)}))
+
+
+def print_table(peers: Sequence[PeerHealth]) -> None:
+    """One row per peer, its reasons below."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for title in ("", "role", "level"):
+        table.add_column(title)
+    for title in ("step", *SHOWN, "refused"):
+        table.add_column(title, justify="right")
+    for peer in peers:
+        refused = sum(count for name, count in peer.counters.items() if name.startswith("refused."))
+        counts = [f"{peer.counters[name]:g}" if name in peer.counters else "–" for name in SHOWN]
+        table.add_row(peer.name, peer.role, peer.level, str(peer.step), *counts, f"{refused:g}")
+    console.print(table)
+    for peer in peers:
+        for reason in peer.reasons:
+            console.print(f"{peer.level} {peer.role}/{peer.name}: {reason}", markup=False, soft_wrap=True)
+    console.print(f"the mesh: {worst([peer.level for peer in peers])}")
