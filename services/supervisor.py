@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from lsu_mesh.mesh.config.settings import SupervisorSettings
 
 LAST_WORDS = 12
-STOP_ORDER = ("plant", "sensor", "filter", "fusion", "recorder")
+STOP_ORDER = ("plant", "sensor", "identifier", "filter", "fusion", "recorder")
 PATIENCE_S = {"recorder": 20.0}
 """Seconds from SIGTERM to SIGKILL, 4 unless the role needs longer to write its file."""
 

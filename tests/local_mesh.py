@@ -9,6 +9,7 @@ from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import Event, Message, Posterior, Truth, encode
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
+from lsu_mesh.mesh.nodes.identifier import IdentifierNode
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
@@ -52,6 +53,8 @@ class LocalMesh:
             return FilterNode(self.configuration, name, identity)
         if role == "fusion":
             return FusionNode(self.configuration, name, identity)
+        if role == "identifier":
+            return IdentifierNode(self.configuration, name, identity)
         if self.configuration.sensors[name].file is not None:
             return FileSensorNode(self.configuration, name, identity, schedule)
         return SimulatedSensorNode(self.configuration, name, identity)

@@ -108,6 +108,11 @@ class Filter(ABC):
     def restore(self, snapshot: object) -> None:
         """Return to a state taken by :meth:`snapshot`, bit by bit."""
 
+    @property
+    def half_widths(self) -> tuple[Vector, Vector]:
+        """Half-widths (q,), (m,) of the noise that the filter goes by: the model's, or its own estimates."""
+        return np.array(self.model.rho), np.array(self.model.r)
+
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull ``(lower, upper)`` of the state now."""
         return self.support.bounds()

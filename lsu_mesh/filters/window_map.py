@@ -135,6 +135,11 @@ class WindowMAP(Filter):
         return np.array(self._state.r)
 
     @property
+    def half_widths(self) -> tuple[Vector, Vector]:
+        """The estimates :attr:`rho`, :attr:`r`."""
+        return self.rho, self.r
+
+    @property
     def theta(self) -> Vector:
         """Estimates (t,) of the unknown entries, in their order."""
         return np.array(self._state.data.theta)

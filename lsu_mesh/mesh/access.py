@@ -12,6 +12,7 @@ PUBLISHES = {
     "sensor": ("measurement",),
     "filter": ("prediction", "posterior"),
     "fusion": ("fused",),
+    "identifier": ("bounds",),
     "recorder": (),
 }
 """Topics of each role, besides those of every peer."""
@@ -33,6 +34,9 @@ def subscriptions(configuration: Configuration, role: str, name: str) -> list[tu
         return _truth(configuration) if configuration.sensors[name].file is None else []
     if role == "filter":
         return _of_filter(configuration, name)
+    if role == "identifier":
+        sensors = configuration.identifiers[name].sensors
+        return [*(("measurement", sensor) for sensor in sensors), *_inputs(configuration)]
     if role == "fusion":
         sources = configuration.fusion[name].sources
         listed = [("fused" if source in configuration.fusion else "posterior", source) for source in sources]
@@ -86,4 +90,5 @@ def _of_filter(configuration: Configuration, name: str) -> list[tuple[str, str]]
         fused |= set(settings.transfer_from)
     elif settings.transfer != "off":
         listed += [("prediction", source) for source in settings.transfer_from]
+    listed += [("bounds", settings.adopt)] if settings.adopt else []
     return [*listed, *(("fused", fusion) for fusion in sorted(fused))]

@@ -18,6 +18,7 @@ from lsu_mesh.mesh.messages import (
     Posterior,
     Prediction,
     Refused,
+    Suggestion,
     SupportMessage,
     Truth,
     decode,
@@ -30,6 +31,7 @@ ROLE_OF_TOPIC = {
     "prediction": "filter",
     "posterior": "filter",
     "fused": "fusion",
+    "bounds": "identifier",
 }
 WINDOW = 4096
 """How far back in a sequence a message may come late and still be told from a copy."""
@@ -81,6 +83,7 @@ class Gate:
         self._inputs = configuration.base_model.input_count
         self._last = configuration.mesh.steps
         self._most_generators = most_generators(configuration)
+        self._noises = configuration.base_model.rho.size
         self._rows = {name: len(sensor.C) for name, sensor in configuration.sensors.items()}
         self._names = {
             "plant": frozenset({configuration.plant.name} if configuration.plant else ()),
@@ -88,6 +91,7 @@ class Gate:
             "filter": frozenset(configuration.filters),
             "fusion": frozenset(configuration.fusion),
             "recorder": frozenset({"recorder"}),
+            "identifier": frozenset(configuration.identifiers),
         }
         self._sequences: dict[tuple[str, str], Sequence] = {}
         self.received = 0
@@ -159,6 +163,11 @@ class Gate:
             found, expected = len(message.y), self._rows[name]
         elif isinstance(message, Prediction | Posterior | Fused):
             found, expected = len(message.lower), self._states
+        elif isinstance(message, Suggestion):
+            found, expected = len(message.rho), self._noises
+            for sensor, widths in message.r.items():
+                if len(widths) != self._rows.get(sensor):
+                    raise Refused("shape", f"r of {sensor} has {len(widths)} numbers")
         else:
             return
         if found != expected:

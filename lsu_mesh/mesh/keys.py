@@ -7,7 +7,7 @@ import re
 from typing import NamedTuple
 
 PREFIX = "lsu/v1"
-TOPICS = ("truth", "input", "measurement", "prediction", "posterior", "fused", "health", "event", "live")
+TOPICS = ("truth", "input", "measurement", "prediction", "posterior", "fused", "bounds", "health", "event", "live")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 LONGEST = len(PREFIX) + 3 * 65
 """Longest key in characters."""

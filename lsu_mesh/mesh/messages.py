@@ -266,6 +266,29 @@ class Fused(Posterior, frozen=True, kw_only=True):
     quarantined: Annotated[list[Text], Meta(max_length=4096)]
 
 
+class Suggestion(Message, frozen=True, kw_only=True):
+    """Noise bounds that explain the data of steps first … last; ``step`` is ``last``."""
+
+    topic = "bounds"
+    rho: Numbers
+    r: Annotated[dict[Text, Numbers], Meta(max_length=4096)]
+    """By sensor."""
+    factor: float
+    """By what the bounds in force must be multiplied to explain the data."""
+    margin: float
+    first: Count
+    last: Count
+    explained: bool
+    """Whether the bounds in force explain the data."""
+    adopt_at: Count | None = None
+    """From this step on filters that adopt go by these bounds; nil where they are only told."""
+
+    def __post_init__(self) -> None:
+        Message.__post_init__(self)
+        Bounds(rho=self.rho, r=[width for widths in self.r.values() for width in widths])
+        _check_finite("factor and margin", [self.factor, self.margin])
+
+
 class Health(Message, frozen=True, kw_only=True):
     """How a peer does, once a second."""
 
@@ -295,7 +318,7 @@ class Event(Message, frozen=True, kw_only=True):
 
 
 TYPES: dict[str, type[Message]] = {
-    kind.topic: kind for kind in (Truth, Input, Measurement, Prediction, Posterior, Fused, Health, Event)
+    kind.topic: kind for kind in (Truth, Input, Measurement, Prediction, Posterior, Fused, Suggestion, Health, Event)
 }
 _DECODERS: dict[str, msgspec.msgpack.Decoder[Any]] = {
     topic: msgspec.msgpack.Decoder(kind, strict=True) for topic, kind in TYPES.items()
@@ -398,6 +421,16 @@ def example(topic: str) -> Message:
             "faults": 1,
             "quarantined": [],
             "rejected": [Rejection(source="cz", reason="disjoint")],
+        },
+        "bounds": {
+            "rho": [0.1, 0.1],
+            "r": {"s1": [0.36]},
+            "factor": 2.0,
+            "margin": 1.2,
+            "first": 1,
+            "last": 42,
+            "explained": False,
+            "adopt_at": 62,
         },
         "health": {"role": "filter", "level": "OK", "reasons": [], "counters": {"received": 84.0, "gaps": 0.0}},
         "event": {

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Truth
+from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Suggestion, Truth
 from lsu_mesh.mesh.nodes.estimator import START_GRACE, Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
@@ -20,7 +20,7 @@ from lsu_mesh.mesh.nodes.node import SECOND
 
 DRAINED_NS = 2_000_000
 """Messages that came within so short a time, or within half a step, are taken together, as a peer drains its queue."""
-SOURCES = (Truth, Input, Measurement)
+SOURCES = (Truth, Input, Measurement, Suggestion)
 
 
 class Timed(NamedTuple):

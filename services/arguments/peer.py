@@ -11,6 +11,7 @@ ROLES = {
     "sensor": "simulate a sensor, or play its file of measurements",
     "filter": "run one filter on its sensors and publish posteriors",
     "fusion": "intersect the posteriors of all filters",
+    "identifier": "watch measurements and suggest noise bounds that explain them",
     "recorder": "write everything into a Rerun recording",
 }
 

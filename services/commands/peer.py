@@ -83,6 +83,10 @@ def make_node(configuration: Configuration, options: argparse.Namespace) -> Node
         from lsu_mesh.mesh.nodes.filter import FilterNode
 
         return FilterNode(configuration, name, boot)
+    if options.role == "identifier":
+        from lsu_mesh.mesh.nodes.identifier import IdentifierNode
+
+        return IdentifierNode(configuration, name, boot)
     from lsu_mesh.mesh.nodes.fusion import FusionNode
 
     return FusionNode(configuration, name, boot)

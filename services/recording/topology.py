@@ -9,7 +9,7 @@ from services.recording.palette import ABSENT, OTHER, Color
 from services.recording.timeline import Moment, Timelines, one_row
 
 ENTITY = "/topology"
-ROLES = ("plant", "sensor", "filter", "fusion", "recorder")
+ROLES = ("plant", "sensor", "filter", "fusion", "identifier", "recorder")
 COLUMN_WIDTH, ROW_HEIGHT = 190.0, 70.0
 
 
@@ -81,4 +81,7 @@ def links(configuration: Configuration) -> list[tuple[str, str]]:
         edges += [(sensor, name) for sensor in settings.sensors]
     for name, fusion in configuration.fusion.items():
         edges += [(source, name) for source in fusion.sources]
+    for name, identifier in configuration.identifiers.items():
+        edges += [(sensor, name) for sensor in identifier.sensors]
+        edges += [(name, other) for other, settings in configuration.filters.items() if settings.adopt == name]
     return edges

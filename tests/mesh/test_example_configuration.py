@@ -13,7 +13,7 @@ from lsu_mesh.mesh.config import load, load_with_keys
 
 OPTION = re.compile(r"^# (\w+ = .*)$", re.MULTILINE)
 EXCLUSIVE = {"sensors.s3.step", "sensors.s3.time", "sensors.s3.file", "sensors.s3.columns", "plant.file",
-             "plant.columns", "plant.step", "plant.time"}  # fmt: skip
+             "plant.columns", "plant.step", "plant.time", "filters.window.E"}  # fmt: skip
 """Options that stand beside another one in the example, so that both cannot be on."""
 
 
@@ -37,12 +37,12 @@ def paths(values: dict[str, Any], prefix: str = "") -> set[str]:
 
 def general(path: str) -> str:
     """A path without the name of the peer: ``filters.*.deadline``."""
-    return re.sub(r"^(sensors|filters|fusion)\.\w+", r"\1.*", path)
+    return re.sub(r"^(sensors|filters|fusion|identifier)\.\w+", r"\1.*", path)
 
 
 def test_the_example_is_valid_as_it_stands(example: Path) -> None:
     configuration = load(example)
-    assert set(configuration.filters) == {"box", "para", "cz", "zonotope"}
+    assert set(configuration.filters) == {"box", "para", "cz", "zonotope", "window", "kalman"}
 
 
 def test_every_option_of_the_schema_is_in_the_example_and_none_besides(example: Path) -> None:
@@ -54,7 +54,18 @@ def test_every_option_of_the_schema_is_in_the_example_and_none_besides(example: 
     tables = {
         general(path) for path in shown if path in ("mesh", "model", "plant", "recorder", "network", "supervisor")
     }
-    groups = {"sensors", "filters", "fusion", "sensors.*", "filters.*", "fusion.*", "model.prior", "model.domain"}
+    groups = {
+        "sensors",
+        "filters",
+        "fusion",
+        "sensors.*",
+        "filters.*",
+        "fusion.*",
+        "identifier",
+        "identifier.*",
+        "model.prior",
+        "model.domain",
+    }
     assert shown - known - tables - groups - {"model.input_box", "network.tls"} == set()
 
 
@@ -77,7 +88,18 @@ def test_the_commented_values_are_the_defaults(example: Path, tmp_path: Path) ->
     lines = []
     for line in example.read_text().splitlines():
         option = OPTION.match(line)
-        skipped = ("start_time", "file", "columns", "step ", "time ", "cache", "source", "transfer_from", "noise_map")
+        skipped = (
+            "start_time",
+            "file",
+            "columns",
+            "step ",
+            "time ",
+            "cache",
+            "source",
+            "transfer_from",
+            "noise_map",
+            "adopt",
+        )
         lines.append(option[1] if option and not option[1].startswith(skipped) else line)
     variant = tmp_path / "variant.toml"
     variant.write_text("\n".join(lines))

@@ -13,7 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
-from lsu_mesh.mesh.config.peers import read_filter, read_fusion, read_plant, read_sensor, shared_sensor_warnings
+from lsu_mesh.mesh.config.peers import (
+    check_learning,
+    is_guaranteed,
+    read_filter,
+    read_fusion,
+    read_identifier,
+    read_plant,
+    read_sensor,
+    shared_sensor_warnings,
+)
 from lsu_mesh.mesh.config.settings import (
     Configuration,
     MeshSettings,
@@ -135,13 +144,17 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     }
     plant = read_plant(root.table("plant"), model, sensors, path.parent, problems)
     filter_tables, fusion_tables = _named(root, "filters", problems), _named(root, "fusion", problems)
-    peers = {"filters": list(filter_tables), "fusion": list(fusion_tables)}
+    identifier_tables = _named(root, "identifier", problems)
+    sound = [name for name, table in filter_tables.items() if is_guaranteed(table.values.get("kind"))]
+    peers = {"filters": sound, "fusion": list(fusion_tables), "identifier": list(identifier_tables)}
     filters = {name: read_filter(table, name, sensors, model, prior, peers) for name, table in filter_tables.items()}
     fusion = {name: read_fusion(table, name, filters, peers) for name, table in fusion_tables.items()}
+    identifiers = {name: read_identifier(table, name, sensors) for name, table in identifier_tables.items()}
+    check_learning(filters, fusion, identifiers, sound, problems)
     recorder, network = _read_recorder(root), read_network(root)
     supervisor = _read_supervisor(root)
     root.finish()
-    names = [*sensors, *filters, *fusion, *([plant.name] if plant else []), "recorder"]
+    names = [*sensors, *filters, *fusion, *identifiers, *([plant.name] if plant else []), "recorder"]
     _check_names(names, problems)
     check_reserved(network, names, problems)
     if any(s.file and s.file.indexed_by == "time" for s in sensors.values()) and mesh.start_time is None:
@@ -154,6 +167,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
         path, mesh, model, prior, input_box, plant, dict(sorted(sensors.items())), dict(sorted(filters.items())),
         dict(sorted(fusion.items())), recorder, network, supervisor,
         (*shared_sensor_warnings(filters, fusion), *open_endpoint_warnings(network)),
+        identifiers=dict(sorted(identifiers.items())),
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from lsu_mesh.filters.registry import FILTERS, filter_class
 from lsu_mesh.mesh.config.settings import (
     FilterSettings,
     FusionSettings,
+    IdentifierSettings,
     MeasurementFileSettings,
     PlantSettings,
     SensorFault,
@@ -77,11 +78,16 @@ def read_sensor(table: Table, name: str, states: int | None, folder: Path) -> Se
         table.wrong("source", 'is "simulated", but a file is given; remove one of the two')
     if source == "file" and file is None and "file" not in table.values:
         table.wrong("file", 'is missing; source = "file" needs the path of a CSV file')
+    simulated = tuple(table.vector("simulated_r", []))
+    if simulated and (source == "file" or len(simulated) != len(rows) or min(simulated) < 0):
+        table.wrong(
+            "simulated_r", f'expected {len(rows)} half-widths ≥ 0, source = "simulated"; found {list(simulated)}'
+        )
     faults = tuple(_read_fault(item) for item in table.tables("faults"))
     if faults and source == "file":
         table.wrong("faults", "faults are simulated, a sensor that plays a file has none; remove the key")
     table.finish()
-    return SensorSettings(name, tuple(map(tuple, rows)), tuple(widths), tuple(outputs), file, faults)
+    return SensorSettings(name, tuple(map(tuple, rows)), tuple(widths), tuple(outputs), file, faults, simulated)
 
 
 def _read_fault(table: Table) -> SensorFault:
@@ -142,12 +148,35 @@ def read_filter(
     senders = _read_senders(table, name, transfer, peers)
     on_contradiction = table.choice("on_contradiction", CONTRADICTIONS, "reset")
     reset_after = table.whole("reset_after", 5, low=1)
+    adopt = _read_adopt(table, peers["identifier"], model)
     options = table.rest()
     if isinstance(kind, str) and kind in FILTERS:
         _check_options(table, kind, options, sensors, chosen, model, prior)
     return FilterSettings(
-        name, str(kind), chosen, deadline, history, transfer, senders, on_contradiction, reset_after, options
+        name,
+        str(kind),
+        chosen,
+        deadline,
+        history,
+        transfer,
+        senders,
+        on_contradiction,
+        reset_after,
+        options,
+        adopt,
     )
+
+
+def _read_adopt(table: Table, identifiers: Collection[str], model: LSUModel | None) -> str:
+    """``adopt``: adoption starts again from the domain, so there must be one."""
+    adopt = table.text("adopt", None)
+    if adopt is None:
+        return ""
+    if adopt not in identifiers:
+        table.wrong("adopt", f'there is no identifier "{adopt}"; {nearest(adopt, identifiers)}')
+    elif model is not None and model.domain is None:
+        table.wrong("adopt", "adopting bounds starts again from the domain; give [model.domain]")
+    return str(adopt)
 
 
 def _read_senders(table: Table, name: str, transfer: str, peers: Mapping[str, Collection[str]]) -> tuple[str, ...]:
@@ -169,6 +198,7 @@ def _read_senders(table: Table, name: str, transfer: str, peers: Mapping[str, Co
 
 _OWN = (
     "kind", "sensors", "deadline", "history", "transfer", "transfer_from", "on_contradiction", "reset_after",
+    "adopt",
 )  # fmt: skip
 
 
@@ -219,6 +249,51 @@ def read_fusion(
     return FusionSettings(
         name, sources, policy, faults, max_lag, deadline, quarantine_after, max_generators, max_constraints
     )
+
+
+def read_identifier(table: Table, name: str, sensors: Mapping[str, SensorSettings]) -> IdentifierSettings:
+    """``[identifier.NAME]``."""
+    chosen = _read_names(table, "sensors", sensors)
+    learn = table.choice("learn", ("r", "rho", "both"), "both")
+    window = table.whole("window", 200, low=2, high=100_000)
+    every = table.whole("every", 50, low=1)
+    margin = table.number("margin", 1.2)
+    if margin < 1.0:
+        table.wrong("margin", f"expected at least 1, found {margin:g}")
+    lead = table.whole("lead", 20, low=1)
+    table.finish()
+    return IdentifierSettings(name, chosen, learn, window, every, margin, lead)
+
+
+def is_guaranteed(kind: object) -> bool:
+    """Whether the sets of filters of this kind hold the state as long as the bounds do."""
+    return not isinstance(kind, str) or kind not in FILTERS or filter_class(kind).guarantee == "declared"
+
+
+def check_learning(
+    filters: Mapping[str, FilterSettings],
+    fusion: Mapping[str, FusionSettings],
+    identifiers: Mapping[str, IdentifierSettings],
+    sound: Collection[str],
+    problems: Problems,
+) -> None:
+    """A fusion intersects guaranteed sets only, those of ``sound`` filters, and predicts with the declared rho."""
+    for settings in fusion.values():
+        for source in settings.sources:
+            if source not in filters:
+                continue
+            one = filters[source]
+            if source not in sound:
+                text = f'"{source}" is a {one.kind}, whose sets are estimates; a fusion intersects guaranteed sets only'
+                problems.add(f"[fusion.{settings.name}] sources", text)
+            if one.adopt in identifiers and identifiers[one.adopt].learn != "r":
+                text = f'its rho may change, the fusion "{settings.name}" would not know; set learn = "r" there'
+                problems.add(f"[filters.{source}] adopt", text)
+    for one in filters.values():
+        lacking = set(one.sensors) - set(identifiers[one.adopt].sensors) if one.adopt in identifiers else set()
+        if lacking:
+            text = f'"{one.adopt}" does not listen to {", ".join(sorted(lacking))}, whose r the filter needs'
+            problems.add(f"[filters.{one.name}] adopt", text)
 
 
 def _read_names(table: Table, key: str, known: Mapping[str, object]) -> tuple[str, ...]:

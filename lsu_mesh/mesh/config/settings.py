@@ -71,6 +71,13 @@ class SensorSettings:
     outputs: tuple[str, ...]
     file: MeasurementFileSettings | None
     faults: tuple[SensorFault, ...]
+    simulated_r: tuple[float, ...] = ()
+    """Half-widths of the simulated noise, where they are not r."""
+
+    @property
+    def true_r(self) -> tuple[float, ...]:
+        """Half-widths of the simulated noise."""
+        return self.simulated_r or self.r
 
 
 @dataclass(frozen=True)
@@ -88,6 +95,8 @@ class FilterSettings:
     on_contradiction: str
     reset_after: int
     options: Mapping[str, Any]
+    adopt: str = ""
+    """The identifier whose bounds are adopted."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +112,19 @@ class FusionSettings:
     quarantine_after: int
     max_generators: int
     max_constraints: int
+
+
+@dataclass(frozen=True)
+class IdentifierSettings:
+    """``[identifier.NAME]``; ``window``, ``every`` and ``lead`` in steps."""
+
+    name: str
+    sensors: tuple[str, ...]
+    learn: str
+    window: int
+    every: int
+    margin: float
+    lead: int
 
 
 @dataclass(frozen=True)
@@ -169,6 +191,8 @@ class Configuration:
     values: Mapping[str, Any] = field(default_factory=dict, compare=False)
     """The TOML values that all of this was read from, flags and environment included."""
 
+    identifiers: Mapping[str, IdentifierSettings] = field(default_factory=dict)
+
     def model(self, sensors: Iterable[str]) -> LSUModel:
         """The model whose rows of C are those of the named sensors, in the order of their names."""
         chosen = [self.sensors[name] for name in sorted(sensors)]
@@ -193,6 +217,7 @@ class Configuration:
         """``(role, name)`` of every peer, in the order in which they are started."""
         listed = [("recorder", "recorder")]
         listed += [("fusion", name) for name in self.fusion]
+        listed += [("identifier", name) for name in self.identifiers]
         listed += [("filter", name) for name in self.filters]
         listed += [("sensor", name) for name in self.sensors]
         if self.plant is not None:

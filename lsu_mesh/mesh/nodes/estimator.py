@@ -91,7 +91,9 @@ class Estimator(Node):
         self._counts: dict[str, float] = {
             "late": 0, "rewinds": 0, "contradictions": 0, "behind": 0, "resets": 0, "from the future": 0,
         }  # fmt: skip
-        self.guarantee: Guarantee = engine.guarantee
+        self.best_guarantee: Guarantee = engine.guarantee
+        """No set of the node is better than this."""
+        self.guarantee: Guarantee = self.best_guarantee
         """The weakest guarantee among all that the set descends from."""
         self._remarks: list[Message] = []
         """Events of a time update."""
@@ -443,7 +445,7 @@ class Estimator(Node):
 
     def start_from(self, base: Base, used: Sequence[Reference] = ()) -> None:
         """Note that the engine now holds a set made from ``base`` and ``used`` alone."""
-        self.guarantee, self.unsound = self.engine.guarantee, ""
+        self.guarantee, self.unsound = self.best_guarantee, ""
         self._base, self._used, self._restarted = base, tuple(used), True
         self._never_rewind()
 

@@ -12,7 +12,7 @@ from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
-from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.config.settings import Configuration, FilterSettings
 from lsu_mesh.mesh.messages import (
     Bounds,
     Fused,
@@ -22,17 +22,19 @@ from lsu_mesh.mesh.messages import (
     Posterior,
     Prediction,
     Reference,
+    Suggestion,
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.contradiction import Dropped, update_without_contradicting_strips, widen
-from lsu_mesh.mesh.nodes.estimator import About, Estimator, finite_or_none
+from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator, finite_or_none
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.step import Base, Combined, Status, Step
 from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, SOUND, Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
+from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
-from lsu_mesh.supports.support import Vector
+from lsu_mesh.supports.support import Support, Vector
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,7 @@ class FilterNode(Estimator):
         settings = configuration.filters[name]
         self.settings = settings
         model = configuration.model(settings.sensors)
-        engine = filter_class(settings.kind)(model, configuration.prior, **settings.options)  # type: ignore[call-arg]
-        super().__init__(configuration, name, boot, engine, settings.sensors)
+        super().__init__(configuration, name, boot, make_engine(settings, model, configuration.prior), settings.sensors)
         self._rows: dict[str, slice] = {}
         start = 0
         for sensor in settings.sensors:
@@ -98,6 +99,8 @@ class FilterNode(Estimator):
         self._widened: float | None = None
         """Factor by which r was widened in the current step."""
         self._counts["transfers rejected"] = 0
+        self._announced: Suggestion | None = None
+        """Bounds that are adopted at a step to come."""
 
     @property
     def deadline(self) -> int:
@@ -120,12 +123,19 @@ class FilterNode(Estimator):
             return self._receive_measurement(message, now)
         if isinstance(message, Input):
             return self.take_input(message, now)
-        if isinstance(message, Prediction):
+        if isinstance(message, Suggestion):
+            self._receive_bounds(message)
+        elif isinstance(message, Prediction):
             self.epochs.note(message)
             self._transfer.note(message)
         elif isinstance(message, Posterior):
             self._receive_set(message)
         return []
+
+    def _receive_bounds(self, message: Suggestion) -> None:
+        known = self._announced
+        if message.adopt_at is not None and (known is None or message.sent_ns >= known.sent_ns):
+            self._announced = message
 
     def _receive_set(self, message: Posterior) -> None:
         self.epochs.note(message)
@@ -152,9 +162,10 @@ class FilterNode(Estimator):
 
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
         self._widened = None
+        adopted = self._adopt(k, now)
         y, used, origin = self._stack(step)
         missing = [name for name in self.sources if name not in step.arrived]
-        messages = self._mend(k, y, now)
+        messages = [*adopted, *self._mend(k, y, now)]
         if self.unsound:
             return Combined("inconsistent", [], missing, origin, self.unsound), messages
         before = self.engine.snapshot()
@@ -168,6 +179,23 @@ class FilterNode(Estimator):
         gain = updated.brought.gain
         combined = Combined(updated.status, [*transferred, *used], missing, origin, updated.cause, gain)
         return combined, [*messages, *told, *updated.messages]
+
+    def _adopt(self, k: int, now: int) -> list[Message]:
+        """Go by announced bounds from their step on: from the domain, in a new epoch, and never better than learned."""
+        message, domain = self._announced, self.engine.model.domain
+        if message is None or message.adopt_at is None or k < message.adopt_at or domain is None:
+            return []
+        self._announced = None
+        self.engine = make_engine(self.settings, adopted_model(self.configuration, self.settings, message), domain)
+        self.best_guarantee = max(self.best_guarantee, "learned", key=WEAKNESS.index)
+        self.reach.lose()
+        self._fused.clear()
+        self._inconsistent.clear()
+        self.abandon_epoch("")
+        self.start_from("domain", [message.reference])
+        text = f"step {k}: adopted the bounds that {message.src} found; started again from the domain"
+        about: About = {"step": k, "epoch": self.epochs.number, "source": message.src, "factor": message.factor}
+        return [self.event("WARN", "bounds-adopted", text, now, k, about)]
 
     def _contradicts(self, y: Vector) -> bool:
         """Whether the data are proved to miss the set; it stays as it is."""
@@ -430,8 +458,8 @@ class FilterNode(Estimator):
         )
 
     def _bounds_in_force(self) -> Bounds:
-        model = self.engine.model
-        return Bounds(rho=model.rho.tolist(), r=(model.r * (self._widened or 1.0)).tolist())
+        rho, r = self.engine.half_widths
+        return Bounds(rho=rho.tolist(), r=(r * (self._widened or 1.0)).tolist())
 
     def prediction(self, k: int, now: int) -> list[Message]:
         return [
@@ -444,6 +472,17 @@ class FilterNode(Estimator):
                 guarantee=self.guarantee,
             )
         ]
+
+
+def make_engine(settings: FilterSettings, model: LSUModel, prior: Support) -> Filter:
+    """The filter of this configuration on a model."""
+    return filter_class(settings.kind)(model, prior, **settings.options)  # type: ignore[call-arg]
+
+
+def adopted_model(configuration: Configuration, settings: FilterSettings, message: Suggestion) -> LSUModel:
+    """The model of a filter with the suggested bounds; a sensor of which nothing is said keeps its r."""
+    r = [width for sensor in settings.sensors for width in message.r.get(sensor, configuration.sensors[sensor].r)]
+    return configuration.model(settings.sensors).replace(rho=message.rho, r=r)
 
 
 def described(engine: Filter) -> dict[str, Any]:

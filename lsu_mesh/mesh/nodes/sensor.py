@@ -46,7 +46,7 @@ class SimulatedSensorNode(Node):
         self._done -= {old for old in self._done if old < k - 4096} if len(self._done) > 8192 else set()
         self._step = max(self._step, k)
         unit = random_uniform(self.configuration.mesh.seed, f"{self.name}/noise", k, len(self._settings.r))
-        y = self._distorted(k, measure(self._settings.C, self._settings.r, message.x, unit))
+        y = self._distorted(k, measure(self._settings.C, self._settings.true_r, message.x, unit))
         mesh = self.configuration.mesh
         time_ns = max(0, round(((mesh.start_time or 0.0) + k * mesh.dt) * 1e9))
         return [Measurement(**self.stamp("measurement", k, now), y=listed(y), time_ns=time_ns)]

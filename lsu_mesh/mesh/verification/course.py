@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction
+from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction, Suggestion
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit
 
 
@@ -27,7 +27,8 @@ def course(posterior: Posterior, first: int, archive: Archive) -> dict[int, Brou
     if first > posterior.step:
         raise DoesNotFit("base", f"a set of step {first}", f"one of step {posterior.step} or before")
     steps = {k: Brought() for k in range(first, posterior.step + 1)}
-    messages = [archive.find(reference, Message) for reference in posterior.used]
+    found = [archive.find(reference, Message) for reference in posterior.used]
+    messages = [message for message in found if not isinstance(message, Suggestion)]  # no matter of a step's data
     for i, message in enumerate(messages):
         k = message.step
         if isinstance(message, Fused) and not isinstance(posterior, Fused):  # carried forward to a later step

@@ -12,14 +12,13 @@ import numpy as np
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
-from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Bounds, Measurement, Posterior, Prediction, Reference
+from lsu_mesh.mesh.messages import Bounds, Measurement, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.nodes import fusion as fusion_node
 from lsu_mesh.mesh.nodes.contradiction import update_without_contradicting_strips, widen
 from lsu_mesh.mesh.nodes.estimator import finite_or_none
-from lsu_mesh.mesh.nodes.filter import described, foretold
+from lsu_mesh.mesh.nodes.filter import adopted_model, described, foretold, make_engine
 from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.nodes.transfer import Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
@@ -150,8 +149,8 @@ class Recomputation(ABC):
         return self._configuration.input_box
 
     def _noise_bounds(self, factor: float = 1.0) -> Bounds:
-        model = self._engine.model
-        return Bounds(rho=model.rho.tolist(), r=(model.r * factor).tolist())
+        rho, r = self._engine.half_widths
+        return Bounds(rho=rho.tolist(), r=(r * factor).tolist())
 
 
 class FilterRecomputation(Recomputation):
@@ -159,10 +158,41 @@ class FilterRecomputation(Recomputation):
 
     def __init__(self, configuration: Configuration, archive: Archive, name: str) -> None:
         self._settings = settings = configuration.filters[name]
-        model = configuration.model(settings.sensors)
-        engine = filter_class(settings.kind)(model, configuration.prior, **settings.options)  # type: ignore[call-arg]
+        engine = make_engine(settings, configuration.model(settings.sensors), configuration.prior)
         super().__init__(configuration, archive, engine)
         self._transfer = Transfer(configuration, settings)
+        self._declared = engine
+        self._adopted: dict[str, dict[int, Filter]] = {}
+        """By process, the epoch at which bounds were adopted and the filter that goes by them."""
+
+    def posterior(self, recorded: Posterior) -> Fields:
+        for reference in recorded.used:
+            if reference[0] == Suggestion.topic:
+                self._adopt(recorded, self._archive.find(reference, Suggestion))
+        self._engine = self._in_force(recorded)
+        return super().posterior(recorded)
+
+    def prediction(self, recorded: Prediction) -> Fields:
+        self._engine = self._in_force(recorded)
+        return super().prediction(recorded)
+
+    def _adopt(self, recorded: Posterior, message: Suggestion) -> None:
+        if message.adopt_at is None or message.adopt_at > recorded.step:
+            raise DoesNotFit("used", f"bounds for step {message.adopt_at}", f"ones for step {recorded.step} or before")
+        model = adopted_model(self._configuration, self._settings, message)
+        engines = self._adopted.setdefault(recorded.boot, {})
+        if recorded.epoch not in engines:
+            engines[recorded.epoch] = make_engine(self._settings, model, self._configuration.prior)
+
+    def _in_force(self, recorded: Posterior | Prediction) -> Filter:
+        """The filter with the bounds that the process went by at this epoch."""
+        engines = self._adopted.get(recorded.boot, {})
+        epochs = [epoch for epoch in engines if epoch <= recorded.epoch]
+        if epochs:
+            return engines[max(epochs)]
+        if self._settings.adopt and recorded.guarantee == "learned" and self._settings.on_contradiction != "widen":
+            raise Unverifiable("the message whose bounds were adopted is not in the recording")
+        return self._declared
 
     def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Fields:
         gain = self._bring_transfers(k, brought)
