@@ -10,9 +10,8 @@ import numpy as np
 
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
-from lsu_mesh.mesh.config.settings import Configuration, FilterSettings
+from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import (
     Bounds,
     Fused,
@@ -25,16 +24,16 @@ from lsu_mesh.mesh.messages import (
     Suggestion,
     SupportMessage,
 )
+from lsu_mesh.mesh.nodes.adoption import adopted_model, is_due, make_engine
 from lsu_mesh.mesh.nodes.contradiction import Dropped, update_without_contradicting_strips, widen
 from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator, finite_or_none
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.step import Base, Combined, Status, Step
 from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, SOUND, Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
-from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
-from lsu_mesh.supports.support import Support, Vector
+from lsu_mesh.supports.support import Vector
 
 
 @dataclass(frozen=True)
@@ -183,7 +182,7 @@ class FilterNode(Estimator):
     def _adopt(self, k: int, now: int) -> list[Message]:
         """Go by announced bounds from their step on: from the domain, in a new epoch, and never better than learned."""
         message, domain = self._announced, self.engine.model.domain
-        if message is None or message.adopt_at is None or k < message.adopt_at or domain is None:
+        if message is None or domain is None or not is_due(message, k):
             return []
         self._announced = None
         self.engine = make_engine(self.settings, adopted_model(self.configuration, self.settings, message), domain)
@@ -472,17 +471,6 @@ class FilterNode(Estimator):
                 guarantee=self.guarantee,
             )
         ]
-
-
-def make_engine(settings: FilterSettings, model: LSUModel, prior: Support) -> Filter:
-    """The filter of this configuration on a model."""
-    return filter_class(settings.kind)(model, prior, **settings.options)  # type: ignore[call-arg]
-
-
-def adopted_model(configuration: Configuration, settings: FilterSettings, message: Suggestion) -> LSUModel:
-    """The model of a filter with the suggested bounds; a sensor of which nothing is said keeps its r."""
-    r = [width for sensor in settings.sensors for width in message.r.get(sensor, configuration.sensors[sensor].r)]
-    return configuration.model(settings.sensors).replace(rho=message.rho, r=r)
 
 
 def described(engine: Filter) -> dict[str, Any]:

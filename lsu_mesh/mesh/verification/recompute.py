@@ -16,9 +16,10 @@ from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Bounds, Measurement, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.nodes import fusion as fusion_node
+from lsu_mesh.mesh.nodes.adoption import adopted_model, is_due, make_engine
 from lsu_mesh.mesh.nodes.contradiction import update_without_contradicting_strips, widen
 from lsu_mesh.mesh.nodes.estimator import finite_or_none
-from lsu_mesh.mesh.nodes.filter import adopted_model, described, foretold, make_engine
+from lsu_mesh.mesh.nodes.filter import described, foretold
 from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.nodes.transfer import Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
@@ -177,7 +178,7 @@ class FilterRecomputation(Recomputation):
         return super().prediction(recorded)
 
     def _adopt(self, recorded: Posterior, message: Suggestion) -> None:
-        if message.adopt_at is None or message.adopt_at > recorded.step:
+        if not is_due(message, recorded.step):
             raise DoesNotFit("used", f"bounds for step {message.adopt_at}", f"ones for step {recorded.step} or before")
         model = adopted_model(self._configuration, self._settings, message)
         engines = self._adopted.setdefault(recorded.boot, {})
