@@ -132,8 +132,7 @@ class FilterNode(Estimator):
         return []
 
     def _receive_bounds(self, message: Suggestion) -> None:
-        known = self._announced
-        if message.adopt_at is not None and (known is None or message.sent_ns >= known.sent_ns):
+        if message.adopt_at is not None and (self._announced is None or message.sent_ns >= self._announced.sent_ns):
             self._announced = message
 
     def _receive_set(self, message: Posterior) -> None:
