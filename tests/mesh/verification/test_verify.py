@@ -67,8 +67,13 @@ def test_every_kind_of_filter_with_data_missing(mesh_of: MakeMesh, kind: str) ->
         "LSUPB": ['filters.box.kind="LSUPB"', 'filters.para.kind="LSUPB"'],
         "ZonotopicKalman": ['filters.box.kind="ZonotopicKalman"'],
         "predictor form": ['filters.box.kind="ZonotopicKalman"', 'filters.box.form="predictor"'],
-        "WindowMAP": ['filters.box.kind="WindowMAP"', "filters.box.window=5"],
-        "Kalman": ['filters.box.kind="Kalman"', 'filters.para.kind="TruncatedKalman"', *DOMAIN],
+        "WindowMAP": ['filters.box.kind="WindowMAP"', "filters.box.window=5", 'fusion.main.sources=["cz", "para"]'],
+        "Kalman": [
+            'filters.box.kind="Kalman"',
+            'filters.para.kind="TruncatedKalman"',
+            'fusion.main.sources=["cz"]',
+            *DOMAIN,
+        ],
         "nearest point": ['filters.cz.point="nearest"'],
     }[kind]
     mesh = mesh_of("mesh.steps=60", *options, carry=lossy(1))
