@@ -42,7 +42,7 @@ def test_the_identifier_says_that_the_bounds_do_not_explain_the_data(mesh: Local
     assert not first.explained
     assert 1.2 < first.factor <= 2.0
     assert first.adopt_at == first.last + 20
-    assert first.r["a"] == [pytest.approx(1.3 * first.factor * 0.15)]
+    assert first.r["a"] == [pytest.approx(1.5 * first.factor * 0.15)]
     assert first.rho == [0.1, 0.1, 0.1]
 
 
@@ -71,7 +71,7 @@ def test_contradictions_end_with_the_adoption_and_the_truth_is_inside(mesh: Loca
         rows = [(p, truth[k]) for k, p in mesh.newest(name).items() if k >= last]
         assert all(p.status != "inconsistent" for p, _ in rows)
         inside = [(np.array(p.lower) <= x).all() and (x <= np.array(p.upper)).all() for p, x in rows]
-        assert np.mean(inside) >= 0.99
+        assert np.mean(inside) == 1.0
     assert mesh.events("bounds-explain")
 
 
