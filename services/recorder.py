@@ -13,7 +13,7 @@ from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from services.bus import Arrival, Bus, Clock, SessionSettings
-from services.cli import COULD_NOT_START, OK
+from services.cli import COULD_NOT_START, FAILURE, OK
 from services.recording.recorder import Recorder
 from services.recording.stream import next_part
 from services.recovery import Recovery
@@ -59,6 +59,10 @@ def run_recorder(
                 service.turn()
     finally:
         recorder.close()
+        for problem in recorder.problems:
+            print(f"recorder: {problem}", file=sys.stderr, flush=True)
+        if not recorder.has_ended:
+            os._exit(FAILURE)  # Rerun's own clean-up at the end of a process would hang as well
     return OK
 
 

@@ -14,6 +14,7 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.ledger import Ledger
 from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Truth
 from services.recording import palette
+from services.recording.bounded import ends_within
 from services.recording.estimates import Estimates
 from services.recording.events import Events
 from services.recording.names import Names
@@ -26,7 +27,11 @@ from services.recording.timeline import Moment, Timelines
 from services.recording.topology import Topology
 
 NOTHING: Mapping[str, str] = MappingProxyType({})
-FLUSH_TIMEOUT_S = 10.0
+FLUSH_TIMEOUT_S = 5.0
+HANGS_S = 8.0
+"""A flush that does not even keep its own time limit hangs for ever."""
+CLOSING_S = 60.0
+"""How long a sound file may take to end."""
 WRITER_ENDED = "File-writer thread shut down"
 """What a flush says after an error of the disk, from which Rerun's writer does not come back."""
 GOING_ON_NS = 300_000_000
@@ -104,6 +109,8 @@ class Recorder:
         self._unflushed: list[tuple[str, str, int]] = []
         self._counts: Counter[str] = Counter()
         self._closed = False
+        self.has_ended = True
+        """False after :meth:`close` where Rerun hangs: the process should then end without waiting for its threads."""
 
     @property
     def flushed(self) -> dict[str, int]:
@@ -167,14 +174,15 @@ class Recorder:
 
     def _write(self) -> None:
         try:
-            self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S)
+            if ends_within(HANGS_S, lambda: self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S)):
+                return
         except RuntimeError as error:
             if WRITER_ENDED not in str(error):
                 raise
-            free = shutil.disk_usage(self.path.parent).free
-            reason = f"only {free} bytes are free there" if free < 2**20 else "Rerun's file writer has ended"
-            self._broken = f"{self.path} takes no more data: {reason}; messages that are lost"
-            self._counts[self._broken] = 0
+        free = shutil.disk_usage(self.path.parent).free
+        reason = f"only {free} bytes are free there" if free < 2**20 else "Rerun's file writer has ended"
+        self._broken = f"{self.path} takes no more data: {reason}; messages that are lost"
+        self._counts[self._broken] = 0
 
     def close(self) -> None:
         """Flush, and end the file with its footer; the second call does nothing."""
@@ -190,7 +198,10 @@ class Recorder:
         if not self._broken:
             self._guarded("drawing space", self._space.finish)
             self.flush()
-        self._guarded("closing the file", self._stream.disconnect)
+        self._guarded("closing the file", self._disconnect)
+
+    def _disconnect(self) -> None:
+        self.has_ended = ends_within(HANGS_S if self._broken else CLOSING_S, self._stream.disconnect)
 
     def _draw(self, message: Message, arrival_ns: int) -> None:
         self._names.check(message)
