@@ -165,7 +165,7 @@ def test_a_long_backlog_whose_intermediate_sets_are_not_published(mesh_of: MakeM
     check(mesh)
     assert node.counters()["behind"] > 100
     assert fusion.counters()["behind"] > 100
-    assert max(len(message.used) for message in mesh.posteriors("main")) > 300
+    assert max(len(message.used) for message in mesh.posteriors("main")) > 200, "one set is made from many steps"
 
 
 def listens(node: Any, message: Message) -> bool:
