@@ -12,6 +12,7 @@ from typing import Any
 
 import msgpack
 import numpy as np
+import psutil
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -300,16 +301,14 @@ def test_a_million_hostile_messages_per_node(number: int) -> None:
     node = nodes_of(configuration)[number]
     node.rehearse()
     assault(configuration, node, 0, 2_000)
-    tracemalloc.start()
-    try:
-        before = tracemalloc.get_traced_memory()[0]
-        slow = 0
-        for seed in range(1, 101):
-            slow += sum(took >= LONGEST_NS for took in assault(configuration, node, seed, 10_000))
-        assert slow == 0
-        assert tracemalloc.get_traced_memory()[0] - before < 50 * 2**20
-    finally:
-        tracemalloc.stop()
+    process = psutil.Process()
+    before, slow = process.memory_info().rss, 0
+    for seed in range(1, 101):
+        slow += sum(took >= LONGEST_NS for took in assault(configuration, node, seed, 10_000))
+    grown = process.memory_info().rss - before
+    print(f"{node.role} {node.name}: 1,000,000 messages, {slow} over 10 ms, memory grew by {grown / 2**20:.0f} MiB")
+    assert slow == 0
+    assert grown < 100 * 2**20
 
 
 @pytest.mark.soak
