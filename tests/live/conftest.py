@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -38,8 +39,9 @@ class Session:
         end = time.monotonic() + timeout
         while time.monotonic() < end:
             for child in self.children():
-                if words in " ".join(child.cmdline()):
-                    return child
+                with contextlib.suppress(psutil.NoSuchProcess):  # a zombie has no command line
+                    if words in " ".join(child.cmdline()):
+                        return child
             time.sleep(0.02)
         raise AssertionError(f"no child {words!r} within {timeout} s")
 
