@@ -1,8 +1,6 @@
 """``python -m services`` is ``lsu-mesh``."""
 
-import sys
-
-from services.cli import main
+from services.cli import entry
 
 if __name__ == "__main__":
-    sys.exit(main())
+    entry()

@@ -8,30 +8,20 @@ is recovered), it never blocks. Callbacks only stamp the arrival and put into a 
 from __future__ import annotations
 
 import json
-import queue
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import zenoh
 from zenoh import ext
 
+from services.arrivals import Arrival, Arrivals
 from services.security import Certificates
 
 LEASE_MS = 2000
 HEARTBEAT_S = 0.1
-QUEUE_LIMIT = 65536
-
-
-class Arrival(NamedTuple):
-    """Something that came: a ``sample``, or a peer that is ``alive`` or ``gone``."""
-
-    what: str
-    key: str
-    payload: bytes
-    arrival_ns: int
 
 
 @dataclass(frozen=True)
@@ -68,11 +58,9 @@ class Bus:
     def __init__(self, settings: SessionSettings, clock: Clock) -> None:
         self._settings = settings
         self._clock = clock
-        self._queue: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        self._arrivals = Arrivals()
         self._publishers: dict[str, Any] = {}
         self._declared: list[Any] = []
-        self.dropped = 0
-        """Arrivals that found the queue full."""
         try:
             self._session = zenoh.open(_zenoh_configuration(settings))
         except zenoh.ZError as error:
@@ -120,13 +108,7 @@ class Bus:
         )
 
     def _enqueue_sample(self, sample: Any) -> None:
-        self._enqueue(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
-
-    def _enqueue(self, arrival: Arrival) -> None:
-        if self._queue.qsize() >= QUEUE_LIMIT:
-            self.dropped += 1
-            return
-        self._queue.put(arrival)
+        self._arrivals.put(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
 
     def declare_alive(self, key: str) -> None:
         """Show that this process is there, for as long as it is."""
@@ -137,7 +119,7 @@ class Bus:
 
         def changed(sample: Any) -> None:
             what = "alive" if sample.kind == zenoh.SampleKind.PUT else "gone"
-            self._enqueue(Arrival(what, str(sample.key_expr), b"", self._clock.now()))
+            self._arrivals.put(Arrival(what, str(sample.key_expr), b"", self._clock.now()))
 
         self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
 
@@ -178,14 +160,16 @@ class Bus:
 
     def next(self, timeout: float) -> Arrival | None:
         """The next arrival, or None after ``timeout`` seconds; 0 does not wait."""
-        try:
-            return self._queue.get(timeout=timeout) if timeout > 0 else self._queue.get_nowait()
-        except queue.Empty:
-            return None
+        return self._arrivals.next(timeout)
 
     def waiting(self) -> int:
         """Arrivals in the queue."""
-        return self._queue.qsize()
+        return len(self._arrivals)
+
+    @property
+    def dropped(self) -> int:
+        """Samples that found the queue full."""
+        return self._arrivals.dropped
 
     def close(self) -> None:
         """Undeclare everything and close; errors of a lost link do not matter any more."""

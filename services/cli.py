@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from typing import NoReturn
 
 from services.arguments import (
     bench,
@@ -21,7 +22,7 @@ from services.arguments import (
     view,
 )
 from services.arguments.parsing import EXIT_CODES
-from services.stop import Stop
+from services.stop import Stop, leave
 
 OK, FAILURE, USAGE, COULD_NOT_START, NOT_MET = 0, 1, 2, 3, 4
 GROUPS = (run, peer, validate, health, keys, view, replay, recording, simulate, identify, reproduce, bench)
@@ -50,7 +51,7 @@ def _version() -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of ``lsu-mesh``; returns the exit code."""
+    """Run one command; returns the exit code."""
     import importlib
 
     options = build_parser().parse_args(arguments)
@@ -66,5 +67,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return FAILURE
 
 
+def entry() -> NoReturn:
+    """Entry point of ``lsu-mesh``."""
+    leave(main())
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    entry()

@@ -11,11 +11,14 @@ from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
-from services.bus import Arrival, Bus, Clock, SessionSettings
+from services.arrivals import Arrival
+from services.bus import Bus, Clock, SessionSettings
 from services.recovery import Recovery
 from services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
+MOST_AT_ONCE = 2048
+"""Messages taken before the node does its steps, however many more are waiting."""
 LONGEST_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
@@ -51,7 +54,7 @@ class Peer:
         self._mesh = node.configuration.mesh.name
         self._links = -1
         self._next_look = 0
-        self._measured_until = self._worst_queue = self._worst_ns = 0
+        self._measured_until = self._worst_queue = self._worst_ns = self._worst_age_ns = 0
         self._recovery = Recovery(node.gate, bus.ask_cache)
 
     def declare(self) -> None:
@@ -95,22 +98,28 @@ class Peer:
     def turn(self) -> None:
         """Wait for something to do, then do all of it."""
         self._watch_links()
-        self._recovery.look(self._clock.now())
+        self._recovery.look(self._clock.now(), self._bus.waiting())
         arrival = self._bus.next(self._patience())
         began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
-        while arrival is not None:
+        age_ns = 0 if arrival is None else began - arrival.arrival_ns
+        for taken in range(1, MOST_AT_ONCE + 1):
+            if arrival is None:
+                break
             self._publish(self._take(arrival))
-            arrival = self._bus.next(0)
+            arrival = self._bus.next(0) if taken < MOST_AT_ONCE else None
         self._publish(self._node.tick(self._clock.now()))
-        self._measure(queued, self._clock.now() - began)
+        self._measure(queued, age_ns, self._clock.now() - began)
 
-    def _measure(self, queued: int, took_ns: int) -> None:
+    def _measure(self, queued: int, age_ns: int, took_ns: int) -> None:
         """What the next health message tells of the process: the worst since the last one."""
         if self._node.next_health != self._measured_until:
-            self._measured_until, self._worst_queue, self._worst_ns = self._node.next_health, 0, 0
+            self._measured_until = self._node.next_health
+            self._worst_queue = self._worst_ns = self._worst_age_ns = 0
         self._worst_queue, self._worst_ns = max(self._worst_queue, queued), max(self._worst_ns, took_ns)
+        self._worst_age_ns = max(self._worst_age_ns, age_ns)
         self._node.gauges |= {
             "queue": float(self._worst_queue),
+            "queue_ms": self._worst_age_ns * 1e-6,
             "dropped": float(self._bus.dropped),
             "step_ms": self._worst_ns * 1e-6,
         }

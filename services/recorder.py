@@ -12,7 +12,8 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
-from services.bus import Arrival, Bus, Clock, SessionSettings
+from services.arrivals import Arrival
+from services.bus import Bus, Clock, SessionSettings
 from services.cli import COULD_NOT_START, FAILURE, OK
 from services.recording.recorder import Recorder
 from services.recording.stream import next_part
@@ -21,7 +22,11 @@ from services.stop import Stop
 
 ROLE_NAME = "recorder"
 AFTER_STOP_S = 0.5
-"""How long the recorder goes on taking what is under way after it was told to stop."""
+"""How long the recorder goes on taking what is under way after it was told to stop, at the most."""
+QUIET_S = 0.2
+"""Then nothing is under way any more."""
+MOST_AT_ONCE = 2048
+"""Messages recorded before the recorder looks up again: at what it is told, and at the time."""
 
 
 def run_recorder(
@@ -54,9 +59,7 @@ def run_recorder(
             print(f"recorder: on the mesh, writing {part}", file=sys.stderr)
             while not stop:
                 service.turn()
-            end = time.monotonic() + AFTER_STOP_S
-            while time.monotonic() < end:
-                service.turn()
+            service.finish()
     finally:
         recorder.close()
         for problem in recorder.problems:
@@ -94,18 +97,34 @@ class RecorderService:
 
     def turn(self) -> None:
         """Take what has come, then flush if it is time."""
-        arrival = self._bus.next(0.05)
-        while arrival is not None:
-            self._take(arrival)
-            arrival = self._bus.next(0)
+        self._take_all(MOST_AT_ONCE)
         now = self._clock.now()
-        self._recovery.look(now)
+        self._recovery.look(now, self._bus.waiting())
         self._recorder.tick(now)
         links = self._bus.links()
         if now >= self._next_health or links != self._links:
             self._links = links
             self._next_health = now + 1_000_000_000
             self._tell_health(now)
+
+    def finish(self) -> None:
+        """Take what is under way, hear no more, and record all that has come; the file is closed by who opened it."""
+        end = time.monotonic() + AFTER_STOP_S
+        quiet_since = time.monotonic()
+        while (now := time.monotonic()) < end and now - quiet_since < QUIET_S:
+            if self._take_all(MOST_AT_ONCE):
+                quiet_since = now
+        self._bus.close()
+        while self._take_all(MOST_AT_ONCE, 0.0):
+            pass
+
+    def _take_all(self, most: int, patience: float = 0.05) -> int:
+        """Record what has come, waiting for the first of it so many seconds; returns how much it was."""
+        taken = 0
+        while taken < most and (arrival := self._bus.next(0.0 if taken else patience)) is not None:
+            self._take(arrival)
+            taken += 1
+        return taken
 
     def _take(self, arrival: Arrival) -> None:
         if arrival.what == "sample":

@@ -13,6 +13,8 @@ from lsu_mesh.mesh.gate import Gate
 SECOND_NS = 1_000_000_000
 MOST_TRIES = 5
 """Then the messages have left the publisher's cache, or the publisher is gone."""
+LONG_QUEUE = 1024
+"""So much waits to be taken, and what is missing may be in there; more questions would only add to it."""
 
 
 class Recovery:
@@ -30,9 +32,9 @@ class Recovery:
         self.asked = 0
         """Questions so far."""
 
-    def look(self, now: int) -> None:
-        """Do what is due."""
-        if now < self._next:
+    def look(self, now: int, waiting: int = 0) -> None:
+        """Do what is due, unless so many messages wait to be taken that the peer has enough to do."""
+        if now < self._next or waiting > LONG_QUEUE:
             return
         self._next = now + SECOND_NS
         gaps = self._gate.gaps_by_key()

@@ -25,7 +25,6 @@ from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from services.bus import Bus, Clock, SessionSettings
 from services.certificate_authority import LOOPBACK_HOSTS
-from services.commands.configuration import cache_size
 from services.commands.keys import make_files
 from services.recovery import Recovery
 from services.security import certificates
@@ -173,7 +172,7 @@ class LiveMesh:
         """Beside the mesh: it holds the entry, or is a client of the router."""
         entry = self.configuration.network.entry
         files = certificates(self.configuration, READER)
-        size = cache_size(self.configuration)
+        size = self.configuration.cached
         if self.star:
             return SessionSettings((entry,), (), mode="client", cache=size, certificates=files)
         return SessionSettings((), (entry,), cache=size, certificates=files)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import sys
 from pathlib import Path
@@ -14,8 +13,6 @@ from services.bus import SessionSettings
 from services.security import certificates, check_endpoints
 
 DEMO = Path(__file__).resolve().parent.parent / "demo.toml"
-CACHED_SECONDS = 6.0
-"""So much of the past a publisher keeps: the lease and a reconnection, with room."""
 
 
 def load_or_explain(file: str | None, options: argparse.Namespace) -> Configuration | None:
@@ -68,7 +65,7 @@ def session_settings(configuration: Configuration, options: argparse.Namespace) 
         connect=tuple(endpoint for endpoint in connect if endpoint not in listen),
         listen=tuple(listen),
         mode=options.mode or "peer",
-        cache=cache_size(configuration),
+        cache=configuration.cached,
         multicast=options.multicast_scouting,
         zenoh=tuple(options.cfg),
         certificates=certificates(configuration, name),
@@ -78,9 +75,3 @@ def session_settings(configuration: Configuration, options: argparse.Namespace) 
 def any_port(configuration: Configuration) -> str:
     """A free port of the loopback interface."""
     return f"{'tls' if configuration.network.tls.enabled else 'tcp'}/127.0.0.1:0"
-
-
-def cache_size(configuration: Configuration) -> int:
-    """Messages per key that a publisher keeps for those who come late."""
-    given = configuration.network.cache
-    return given if given is not None else max(256, math.ceil(CACHED_SECONDS * configuration.mesh.rate))

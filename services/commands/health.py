@@ -13,7 +13,8 @@ from lsu_mesh.mesh.keys import PREFIX, key, parse
 from lsu_mesh.mesh.messages import Health
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
-from services.bus import Arrival, Bus, Clock, NoSession
+from services.arrivals import Arrival
+from services.bus import Bus, Clock, NoSession
 from services.cli import COULD_NOT_START, NOT_MET, OK, USAGE
 from services.commands.configuration import load_or_explain, session_settings
 from services.security import InsecureSession

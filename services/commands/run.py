@@ -13,9 +13,10 @@ from typing import Protocol
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh.mesh.playback import read_playback
-from services.bus import Arrival, Bus, Clock, NoSession, SessionSettings
+from services.arrivals import Arrival
+from services.bus import Bus, Clock, NoSession, SessionSettings
 from services.cli import COULD_NOT_START, FAILURE, OK, USAGE
-from services.commands.configuration import DEMO, any_port, cache_size, flags, load_or_explain, print_warnings
+from services.commands.configuration import DEMO, any_port, flags, load_or_explain, print_warnings
 from services.report import RunReport
 from services.security import InsecureSession, certificates, check_endpoints
 from services.stop import Stop
@@ -142,7 +143,7 @@ def _session_settings(configuration: Configuration, options: argparse.Namespace)
     return SessionSettings(
         connect=network.connect,
         listen=listen,
-        cache=cache_size(configuration),
+        cache=configuration.cached,
         certificates=certificates(configuration, READER),
     )
 

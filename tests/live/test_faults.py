@@ -12,8 +12,6 @@ import pytest
 from live_faults import Outcome, stop_all
 from live_mesh import LiveMesh, Seen
 
-from services.commands.configuration import cache_size
-
 pytestmark = pytest.mark.live
 
 SLOWEST_S = 30.0
@@ -48,7 +46,7 @@ def test_a_killed_peer_comes_back_and_nothing_is_lost(mesh: LiveMesh, role: str)
 
 
 def test_a_killed_filter_starts_from_a_sound_set_that_the_mesh_remembers(mesh: LiveMesh) -> None:
-    forgotten = cache_size(mesh.configuration) + mesh.steps(1.0)
+    forgotten = mesh.configuration.cached + mesh.steps(1.0)
     mesh.until(lambda: mesh.due() > forgotten, "no cache holds the first steps: no way from the prior")
     mesh.until(lambda: mesh.is_current(0), "estimates flow")
     before = mesh.observer.estimates["cz"][-1].message

@@ -1,4 +1,4 @@
-"""A filter that has thousands of steps in its queue."""
+"""Estimators that have thousands of steps in their queue, or get more than they can do."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from lsu_mesh.mesh.messages import Input, Measurement, Message, Posterior, decode, encode
+import pytest
+
+from lsu_mesh.mesh.messages import Fused, Health, Input, Measurement, Message, Posterior, decode, encode
+from lsu_mesh.mesh.nodes import estimator
 
 STEPS = 1800
 """Three references a step: more than one message may list."""
@@ -32,8 +35,8 @@ def test_what_a_long_backlog_leads_to_is_accepted_by_receivers(mesh_of: Callable
 
 def ticked(node: Any, last: int, now: int) -> list[Message]:
     """What the node publishes until it is past step ``last``; a tick does a limited number of steps."""
-    messages: list[Message] = []
-    for _ in range(2 + last // 1000):
+    messages: list[Message] = node.tick(now)
+    while node.wakeup() == 0:  # at once: there is more to do
         messages += node.tick(now)
     assert node.step() >= last
     return messages
@@ -63,3 +66,50 @@ def test_a_step_of_a_long_backlog_costs_no_more_than_one_of_a_short_backlog(mesh
     cost_per_step(mesh_of, 100)
     short, long = cost_per_step(mesh_of, 1000), cost_per_step(mesh_of, 12000)
     assert long < 2 * short, "a search of the whole backlog in each step would be four times as much and more"
+
+
+AT_ONCE, MOST = 100, 512
+"""Steps of a tick, and steps that may wait."""
+
+
+@pytest.fixture(scope="module")
+def heard(module_mesh: Callable[..., Any]) -> Any:
+    """What was said in a mesh of 2000 steps whose estimators keep up."""
+    mesh = module_mesh("mesh.steps=2000", "mesh.rate=40.0", 'fusion.main.sources=["box","para"]')
+    mesh.kill("cz")
+    mesh.kill("main")
+    mesh.run(2000 / 40 + 0.1, tick_ms=25)
+    return mesh
+
+
+@pytest.mark.parametrize(("role", "name"), [("filter", "box"), ("fusion", "main")])
+def test_one_that_gets_more_than_a_tick_does_stays_bounded_says_so_and_catches_up(
+    heard: Any, monkeypatch: pytest.MonkeyPatch, role: str, name: str
+) -> None:
+    monkeypatch.setattr(estimator, "MOST_AT_ONCE", AT_ONCE)
+    monkeypatch.setattr(estimator, "MOST_STEPS", MOST)
+    node = heard.start(role, name)
+    kinds = Input | Measurement if role == "filter" else Input | Posterior
+    data = [(address, m) for address, m in heard.sent if isinstance(m, kinds) and m.name != name]
+    backlogs, told = [], []
+    for first in range(1, 2001, 250):
+        for address, message in data:
+            if first <= message.step < first + 250:
+                node.deliver(address, encode(message), heard.now)
+        told += node.tick(heard.now + first * 10_000_000)
+        backlogs.append(node.counters()["newest"] - node.step())
+    assert max(backlogs) <= MOST + 1
+    assert backlogs[-1] > estimator.BEHIND, "it did not keep up"
+    reasons = [reason for m in told if isinstance(m, Health) and m.level == "WARN" for reason in m.reasons]
+    assert any(reason.startswith("behind by ") for reason in reasons), reasons
+    published = [m for m in [*told, *ticked(node, 2000, heard.now + 10**11)] if isinstance(m, Posterior)]
+    assert published[-1].step == 2000
+    assert isinstance(published[-1], Fused) == (role == "fusion")
+    assert node.counters()["behind"] + len(published) == 2000
+    assert node.counters()["behind"] > 1500
+    assert node.health(heard.now + 2 * 10**11).level == "OK"
+    truth = heard.truth()
+    for message in published:
+        assert all(
+            low <= x <= high for low, x, high in zip(message.lower, truth[message.step], message.upper, strict=True)
+        )

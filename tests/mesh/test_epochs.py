@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import OrthotopeMessage, Prediction, encode
+from lsu_mesh.mesh.nodes import plant
 from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.verification import verify
 
@@ -196,7 +197,10 @@ def test_a_filter_that_starts_from_a_set_that_misses_its_data_starts_again_from_
 # -- inputs and the domain
 
 
-def test_an_input_that_is_lost_for_good_is_given_up_where_there_is_a_domain(four: Callable[..., Any]) -> None:
+def test_an_input_that_is_lost_for_good_is_given_up_where_there_is_a_domain(
+    four: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plant, "PAST_SECONDS", 0.0)
     mesh = four("mesh.steps=600", DOMAIN)
     mesh.run(0.5)
     mesh.kill("plant")

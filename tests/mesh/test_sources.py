@@ -58,6 +58,41 @@ def test_a_plant_that_starts_again_is_at_the_current_step_with_the_same_values(m
     assert max(mesh.newest("main")) == 400
 
 
+def test_a_plant_that_was_away_for_long_brings_every_input_in_bursts_and_nobody_starts_over(mesh_of: MakeMesh) -> None:
+    mesh = mesh_of("mesh.steps=2000")
+    mesh.run(1.0, tick_ms=20)
+    mesh.kill("plant")
+    mesh.run(25.0, tick_ms=1000)
+    plant = mesh.start("plant", "plant")
+    before = len(mesh.sent)
+    mesh.turn()
+    first = [m for _, m in mesh.sent[before:] if isinstance(m, Input)]
+    assert [m.step for m in first] == list(range(1, 65)), "no flood"
+    mesh.run(3.0)
+    inputs = [m.step for m in mesh.of(Input) if m.boot == plant.boot]
+    assert inputs == list(range(1, inputs[-1] + 1)), "oldest first, none left out"
+    assert mesh.events("started-over") == []
+    truth = mesh.truth()
+    for name in mesh.estimators():
+        newest = mesh.newest(name)
+        assert max(newest) >= 1400
+        last = newest[max(newest)]
+        assert last.status == "ok"
+        assert all(low <= x <= high for low, x, high in zip(last.lower, truth[last.step], last.upper, strict=True))
+
+
+def test_a_plant_that_was_away_for_hours_still_tells_how_it_does(mesh_of: MakeMesh) -> None:
+    mesh = mesh_of("mesh.steps=100000")
+    for name in [name for name in mesh.nodes if name != "plant"]:
+        mesh.kill(name)
+    mesh.now = round(60_000 * 0.02 * 1e9)
+    mesh.nodes["plant"].tick(mesh.now)
+    assert mesh.nodes["plant"].step() == 20_000, "no tick takes for ever"
+    mesh.run(1.0)
+    assert mesh.truth()
+    assert min(m.step for m in mesh.of(Input)) == 60_001 - 1500
+
+
 def test_a_sensor_that_starts_again_measures_the_same(mesh_of: MakeMesh) -> None:
     mesh = mesh_of("mesh.steps=20")
     mesh.run(0.5)

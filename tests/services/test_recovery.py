@@ -67,6 +67,17 @@ def test_a_gap_that_closes_is_asked_for_no_more(gate: Gate, configuration: Confi
     assert (gate.gaps, gate.gaps_by_key()) == (0, {})
 
 
+def test_a_peer_that_has_more_than_enough_to_do_asks_for_nothing(gate: Gate) -> None:
+    asked: list[str] = []
+    recovery = Recovery(gate, asked.append)
+    for second in range(10):
+        recovery.look(second * SECOND_NS, waiting=5000)
+    assert asked == []
+    for second in range(10, 12):
+        recovery.look(second * SECOND_NS, waiting=10)
+    assert asked == [INPUT], "later it does"
+
+
 def test_while_messages_come_the_rest_is_waited_for(gate: Gate, configuration: Configuration) -> None:
     asked: list[str] = []
     recovery = Recovery(gate, asked.append)

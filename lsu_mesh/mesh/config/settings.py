@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +17,8 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
 Matrix = NDArray[np.float64]
+CACHED_SECONDS, LEAST_CACHED = 6.0, 256
+"""So much of the past a publisher keeps: the lease and a reconnection, with room."""
 
 
 @dataclass(frozen=True)
@@ -202,6 +205,12 @@ class Configuration:
             r=[width for sensor in chosen for width in sensor.r],
             outputs=[name for sensor in chosen for name in sensor.outputs],
         )
+
+    @property
+    def cached(self) -> int:
+        """Messages per key that a publisher keeps for those who come late, or who missed them."""
+        given = self.network.cache
+        return given if given is not None else max(LEAST_CACHED, math.ceil(CACHED_SECONDS * self.mesh.rate))
 
     def digest(self) -> str:
         """16 hexadecimal characters over A, B, C, noise_map and the sensors' rows, not over bounds."""

@@ -44,11 +44,13 @@ REHEARSED_STEPS = 6
 BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
 INPUT_LOST = 256
-"""An input that has not come when so many later steps' inputs have is not coming any more: a plant repeats no more."""
+"""So many later inputs have come, and so many that their publisher keeps no more of them: this one does not come."""
 MOST_STEPS = 4096
-"""Steps that are remembered while something is waited for."""
+"""Steps that are remembered while something is waited for, or twice those that publishers keep where these are more."""
 MOST_AT_ONCE = 1024
-"""Steps done in one tick at the most; the next tick goes on."""
+"""Steps done in one tick, the next tick goes on; more only where more than ``MOST_STEPS`` wait."""
+MOST_MESSAGES = 32
+"""So much to publish and a tick ends, the next tick goes on: nobody waits for the first until the last is done."""
 FURTHEST = 4096
 """So many steps, and four times those that the rate allows since the last message, a message may lie ahead."""
 MOST_USED = 2048
@@ -77,6 +79,9 @@ class Estimator(Node):
         self._signs: list[tuple[int, int]] = []
         """Each step that was the newest when it was first heard of, and when that was; both rise."""
         self._silences = Silences(configuration, self.subscriptions(), sources)
+        self._has_more = False
+        """Whether the last tick has left steps that may be ready."""
+        self._most_steps = max(MOST_STEPS, 2 * configuration.cached)
         self._heard_at: int | None = None
         """When the last message came, of whatever step."""
         self._first_evidence: int | None = None
@@ -200,10 +205,12 @@ class Estimator(Node):
         if k > self._newest:
             self._newest = k
             self._signs.append((k, now))
+            if self.current is None and len(self._signs) > 2 * self._most_steps:
+                del self._signs[: self._most_steps]
         if self._first_evidence is None:
             self._first_evidence = now
         step = self._steps.setdefault(k, Step())
-        if len(self._steps) > MOST_STEPS and self.current is None:
+        if len(self._steps) > self._most_steps and self.current is None:
             del self._steps[min(self._steps)]
         return step
 
@@ -224,10 +231,11 @@ class Estimator(Node):
         if self._dirty is not None:
             self._rewind(self._dirty)
             self._dirty = None
+        self._has_more = False
         if self.current is None and not self._start(now):
             return []
         messages: list[Message] = []
-        for _ in range(MOST_AT_ONCE):
+        for left in reversed(range(self._steps_at_once())):
             assert self.current is not None
             k = self.current
             step = self._steps.setdefault(k, Step())
@@ -242,7 +250,19 @@ class Estimator(Node):
             messages += self._said()
             if step.published is not None and not self.unsound and not self._is_behind():
                 messages += self.prediction(k + 1, now)
+            self._has_more = left == 0 or (len(messages) >= MOST_MESSAGES and not self._is_done_again(k + 1))
+            if self._has_more:
+                break
         return messages + self._said()
+
+    def _steps_at_once(self) -> int:
+        """A backlog stays bounded whatever comes: what is too much waits in the queue in front of the node."""
+        assert self.current is not None
+        return max(MOST_AT_ONCE, self._newest - self.current - self._most_steps)
+
+    def _is_done_again(self, k: int) -> bool:
+        """Whether the step was published before: all that a late message changes is told in one tick."""
+        return k in self._steps and self._steps[k].published is not None
 
     def _is_ready(self, k: int, step: Step, now: int) -> bool:
         if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
@@ -259,6 +279,8 @@ class Estimator(Node):
         return self._signs[i][1] if i < len(self._signs) else None
 
     def wakeup(self) -> int | None:
+        if self._has_more:
+            return 0
         if self.current is None:
             return None if self._first_evidence is None else self._first_evidence + START_GRACE
         sign = self._first_sign(self.current)
@@ -358,10 +380,11 @@ class Estimator(Node):
         return said
 
     def _input_is_lost(self, k: int) -> bool:
-        """Whether it makes no sense to wait for the input of step k any longer."""
+        """Whether the input of step k has left its publisher's cache, so that waiting for it makes no sense."""
         if self.current is None:
             return False
-        return self._newest_input - k > INPUT_LOST or len(self._steps) > MOST_STEPS
+        later = self._newest_input - k
+        return later > max(INPUT_LOST, self.configuration.cached) or len(self._steps) > self._most_steps
 
     def _start_over(self, k: int, why: str, now: int) -> None:
         """Nothing is known behind step k: join again there, like a peer that starts late."""
@@ -473,11 +496,16 @@ class Estimator(Node):
         return self._waiting
 
     def complaints(self, now: int) -> list[Complaint]:
-        """As of every node, and which sources have fallen silent."""
+        """As of every node, how far it is behind, and which sources have fallen silent."""
+        found = super().complaints(now)
+        if self.current is not None and self._is_behind():
+            late, unpublished = self._newest - self.current, self._counts["behind"]
+            text = f"behind by {late} steps; {unpublished:g} steps so far were done without being published"
+            found.append(Complaint("WARN", text))
         last = self.configuration.mesh.steps
         has_ended = last is not None and self._newest >= last  # nobody has anything to say any more
         is_early = self._first_evidence is None
-        return super().complaints(now) + ([] if has_ended or is_early else self._silences.complaints(now))
+        return found + ([] if has_ended or is_early else self._silences.complaints(now))
 
     def counters(self) -> dict[str, float]:
         return self._counts | {"epoch": self.epochs.number, "newest": self._newest}

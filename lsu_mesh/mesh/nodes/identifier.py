@@ -25,6 +25,8 @@ from lsu_mesh.supports.support import Vector
 
 GIVEN_UP = 8
 """A step whose measurements have not all come when so many later ones have is looked at as it is."""
+MOST_WAITING = 1024
+"""Steps beyond the window that are kept while something is waited for."""
 ROUNDING = 1e-9
 """A factor above 1 by no more than this is one of the solver's rounding."""
 
@@ -58,6 +60,10 @@ class IdentifierNode(Node):
             self._newest = max(self._newest, message.step)
         elif isinstance(message, Input):
             self._u.setdefault(message.step, np.array(message.u))
+        most = 2 * (self.settings.window + self.settings.every) + MOST_WAITING
+        for kept in (self._y, self._u):
+            while len(kept) > most:  # the other kind does not come
+                del kept[next(iter(kept))]
         return []
 
     def advance(self, now: int) -> list[Message]:

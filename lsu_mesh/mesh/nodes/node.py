@@ -28,6 +28,20 @@ class Complaint(NamedTuple):
     text: str
 
 
+class Rise:
+    """Whether a count has risen in the last seconds."""
+
+    def __init__(self) -> None:
+        self._before = 0.0
+        self._at: int | None = None
+
+    def is_recent(self, count: float, now: int) -> bool:
+        """To be asked about once a second."""
+        if count > self._before:
+            self._before, self._at = count, now
+        return self._at is not None and now - self._at < REMEMBERED_NS
+
+
 class Node(ABC):
     """A peer without its network.
 
@@ -57,11 +71,10 @@ class Node(ABC):
         """When the next health message is due."""
         self._warnings: dict[tuple[str, str], int] = {}
         """When an event of a level and code was last told."""
-        self._refused_before = 0
-        self._refused_at: int | None = None
+        self._refused, self._dropped = Rise(), Rise()
         self._waiting_since: int | None = None
         self.gauges: dict[str, float] = {"links": 0.0}
-        """What the service around the node measures: links, queue, dropped, step_ms; told with the counters."""
+        """What the service around the node measures, told with the counters: links, queue, queue_ms, dropped, step_ms."""
         self.gate = Gate(configuration, {*(topic for topic, _ in self.subscriptions()), *self.answers})
 
     @abstractmethod
@@ -176,11 +189,14 @@ class Node(ABC):
         if waited > PATIENCE_NS:
             level = "ERROR" if waited > LONG_NS else "WARN"
             found.append(Complaint(level, f"waiting for {self.waiting_for()} for {waited / SECOND:.1f} s"))
-        refused = self.gate.refused.total()
-        if refused > self._refused_before:
-            self._refused_before, self._refused_at = refused, now
-        if self._refused_at is not None and now - self._refused_at < REMEMBERED_NS:
+        refused, dropped = self.gate.refused.total(), self.gauges.get("dropped", 0.0)
+        if self._refused.is_recent(refused, now):
             found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {self.gate.last_refusal}"))
+        if self._dropped.is_recent(dropped, now):
+            found.append(Complaint("WARN", f"{dropped:g} message(s) so far found the queue full and were dropped"))
+        queued_s = self.gauges.get("queue_ms", 0.0) * 1e-3
+        if queued_s > PATIENCE_NS / SECOND:
+            found.append(Complaint("WARN", f"messages wait {queued_s:.1f} s in its queue"))
         return found
 
     def _waited(self, now: int) -> int:

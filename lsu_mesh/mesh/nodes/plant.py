@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,8 +18,12 @@ from lsu_mesh.supports.support import Vector
 
 MOST_AT_ONCE = 64
 """Steps published in one tick at the most, so that a late plant does not flood the mesh."""
-PAST_INPUTS = 256
-"""Inputs of the past that a plant publishes again when it starts late: filters need every one."""
+PAST_SECONDS, LEAST_PAST = 30.0, 256
+"""So much of the past, and so many steps, a plant that starts late publishes the inputs of: filters need every one."""
+PAST_PACE_NS = 4_000_000
+"""Between two bursts of past inputs: receivers have to take them besides all else."""
+SILENT_AT_ONCE = 20_000
+"""Steps of a longer past that are simulated in one tick, in silence."""
 
 
 class PlantNode(Node):
@@ -38,6 +43,10 @@ class PlantNode(Node):
         self._model = configuration.base_model
         self._last = configuration.mesh.steps
         self._next = 1
+        self._not_before = 0
+        """When the next burst of past inputs may go out."""
+        self._past: range | None = None
+        """Steps whose inputs alone are published, because they are over; known with the first tick."""
         self._x: Vector = np.array(
             self._settings.x1 if self._settings.x1 is not None else configuration.prior.center, dtype=np.float64
         )
@@ -61,20 +70,37 @@ class PlantNode(Node):
         due = self._schedule.due(now)
         if self._last is not None:
             due = min(due, self._last)
+        if due < self._next:
+            return []
+        if self._past is None:
+            self._past = self._past_before(due)
+        if self._next < self._past.stop:
+            return self._catch_up(self._past, now)
         messages: list[Message] = []
-        if self._next == 1 and due > MOST_AT_ONCE:
-            messages += self._catch_up(due, now)
         while self._next <= due and len(messages) < 2 * MOST_AT_ONCE:
             k = self._next
             messages.append(Truth(**self.stamp("truth", k, now), x=self._x.tolist()))
             messages += self._drive(k, now, publish=True)
         return messages
 
-    def _catch_up(self, due: int, now: int) -> list[Message]:
-        """Simulate the past in silence, but for its newest inputs."""
+    def _past_before(self, due: int) -> range:
+        """The steps before the one that is due, as far back as inputs are repeated; none for a plant in time."""
+        if due <= MOST_AT_ONCE:
+            return range(0)
+        repeated = max(LEAST_PAST, math.ceil(PAST_SECONDS * self.configuration.mesh.rate))
+        return range(max(1, due - repeated), due)
+
+    def _catch_up(self, past: range, now: int) -> list[Message]:
+        """Simulate the past in silence, but for its newest inputs, oldest first, in bursts."""
+        silent_until = min(past.start, self._next + SILENT_AT_ONCE)
+        while self._next < silent_until:
+            self._drive(self._next, now, publish=False)
+        if now < self._not_before or self._next < past.start:
+            return []
+        self._not_before = now + PAST_PACE_NS
         messages: list[Message] = []
-        while self._next < due:
-            messages += self._drive(self._next, now, publish=self._next > due - PAST_INPUTS)
+        while self._next < past.stop and len(messages) < MOST_AT_ONCE:
+            messages += self._drive(self._next, now, publish=True)
         return messages
 
     def _drive(self, k: int, now: int, *, publish: bool) -> list[Message]:
@@ -95,7 +121,8 @@ class PlantNode(Node):
         return input_at(self._settings.inputs, self.configuration.mesh.seed, k, size, f"{self.name}/input")
 
     def wakeup(self) -> int | None:
-        return None if self.finished else self._schedule.time_of(self._next)
+        due = None if self.finished else self._schedule.time_of(self._next)
+        return None if due is None else max(due, self._not_before)
 
     @property
     def finished(self) -> bool:

@@ -32,6 +32,8 @@ from lsu_mesh.supports.support import Support
 SOUND = ("ok", "predicted")
 OLDEST_BOX = 16
 """A fused box that is older than so many steps is not carried forward any more."""
+MOST_STEPS = 4096
+"""Steps whose messages are kept while the filter waits for something else."""
 
 
 class Transfer:
@@ -52,6 +54,9 @@ class Transfer:
             known = boxes.get(message.name)
             if known is None or known.boot != message.boot or known.seq < message.seq:
                 boxes[message.name] = message
+        for kept in (self._predictions, self._fused):
+            while len(kept) > MOST_STEPS:
+                del kept[next(iter(kept))]
 
     def forget_before(self, k: int) -> None:
         """Drop what belongs to steps before k."""

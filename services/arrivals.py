@@ -1,0 +1,54 @@
+"""What has come and waits to be taken: bounded, so that a peer that cannot keep up says so instead of growing."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from typing import NamedTuple
+
+MOST, MOST_BYTES = 65536, 2**26
+"""What waits at the most; what comes then is dropped and counted, and may be asked for again later."""
+
+
+class Arrival(NamedTuple):
+    """Something that came: a ``sample``, or a peer that is ``alive`` or ``gone``."""
+
+    what: str
+    key: str
+    payload: bytes
+    arrival_ns: int
+
+
+class Arrivals:
+    """A queue that network threads put into and one thread takes from; putting never waits."""
+
+    def __init__(self, most: int = MOST, most_bytes: int = MOST_BYTES) -> None:
+        self._queue: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        self._most, self._most_bytes = most, most_bytes
+        self._lock = threading.Lock()
+        self._bytes = 0
+        self.dropped = 0
+        """Samples that found the queue full. Who comes and goes is never dropped: there are few of them."""
+
+    def put(self, arrival: Arrival) -> None:
+        """Queue what came, or drop it where the queue is full."""
+        with self._lock:
+            is_full = self._queue.qsize() >= self._most or self._bytes >= self._most_bytes
+            if is_full and arrival.what == "sample":
+                self.dropped += 1
+                return
+            self._bytes += len(arrival.payload)
+            self._queue.put(arrival)
+
+    def next(self, timeout: float) -> Arrival | None:
+        """The oldest, or None after ``timeout`` seconds; 0 does not wait."""
+        try:
+            arrival = self._queue.get(timeout=timeout) if timeout > 0 else self._queue.get_nowait()
+        except queue.Empty:
+            return None
+        with self._lock:
+            self._bytes -= len(arrival.payload)
+        return arrival
+
+    def __len__(self) -> int:
+        return self._queue.qsize()
