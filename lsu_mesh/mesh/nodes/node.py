@@ -74,7 +74,7 @@ class Node(ABC):
         self._refused, self._dropped = Rise(), Rise()
         self._waiting_since: int | None = None
         self.gauges: dict[str, float] = {"links": 0.0}
-        """What the service around the node measures, told with the counters: links, queue, queue_ms, dropped, step_ms."""
+        """What the service around it measures, told with the counters: links, queue, queue_ms, dropped, step_ms."""
         self.gate = Gate(configuration, {*(topic for topic, _ in self.subscriptions()), *self.answers})
 
     @abstractmethod
