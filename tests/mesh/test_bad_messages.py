@@ -20,13 +20,14 @@ from hypothesis import strategies as st
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import MAX_PAYLOAD, TYPES, Message, Refused, decode, encode, example
-from lsu_mesh.mesh.nodes.estimator import FURTHEST, Estimator
+from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import SECOND, Node
 from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
+from lsu_mesh.mesh.nodes.signs import FURTHEST
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
 
 ROOT = Path(__file__).resolve().parents[2]

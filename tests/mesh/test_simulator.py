@@ -41,7 +41,7 @@ def test_a_stale_set_taken_as_current_is_found(demo: Path, monkeypatch: pytest.M
     begin = Estimator._begin
 
     def begin_now(self: Estimator, k: int, support: Support, base: Base, *, restarted: bool) -> None:
-        begin(self, max(k, self._newest), support, base, restarted=restarted)
+        begin(self, max(k, self._signs.newest), support, base, restarted=restarted)
 
     monkeypatch.setattr(Estimator, "_begin", begin_now)
     _, outcome = seeds_until_found(demo)

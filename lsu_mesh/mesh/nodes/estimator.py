@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -30,6 +29,7 @@ from lsu_mesh.mesh.messages import (
 from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.reach import Reach
+from lsu_mesh.mesh.nodes.signs import Signs
 from lsu_mesh.mesh.nodes.silence import Silences, input_key
 from lsu_mesh.mesh.nodes.step import Base, Combined, Step
 from lsu_mesh.mesh.sets import to_message, to_support
@@ -51,8 +51,6 @@ MOST_AT_ONCE = 1024
 """Steps done in one tick, the next tick goes on; more only where more than ``MOST_STEPS`` wait."""
 MOST_MESSAGES = 32
 """So much to publish and a tick ends, the next tick goes on: nobody waits for the first until the last is done."""
-FURTHEST = 4096
-"""So many steps, and four times those that the rate allows since the last message, a message may lie ahead."""
 MOST_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
 
@@ -74,16 +72,12 @@ class Estimator(Node):
         self._combined = False
         """Whether the data of the current step are in the set."""
         self._steps: dict[int, Step] = {}
-        self._newest = 0
         self._newest_input = 0
-        self._signs: list[tuple[int, int]] = []
-        """Each step that was the newest when it was first heard of, and when that was; both rise."""
+        self._signs = Signs(configuration.mesh.rate / SECOND)
         self._silences = Silences(configuration, self.subscriptions(), sources)
         self._has_more = False
         """Whether the last tick has left steps that may be ready."""
         self._most_steps = max(MOST_STEPS, 2 * configuration.cached)
-        self._heard_at: int | None = None
-        """When the last message came, of whatever step."""
         self._first_evidence: int | None = None
         self._candidate: Posterior | None = None
         self._base: Base = "prior"
@@ -199,27 +193,18 @@ class Estimator(Node):
 
     def _see(self, k: int, now: int) -> Step | None:
         """The record of step k, or None when it lies before all that is remembered."""
-        if self.current is not None and (k < self.current - self.history or self._is_from_the_future(k, now)):
+        if self.current is not None and k < self.current - self.history:
             return None
-        self._heard_at = now
-        if k > self._newest:
-            self._newest = k
-            self._signs.append((k, now))
-            if self.current is None and len(self._signs) > 2 * self._most_steps:
-                del self._signs[: self._most_steps]
+        if self.current is not None and self._signs.is_from_the_future(k, now):
+            self._counts["from the future"] += 1
+            return None
+        self._signs.note(k, now)
         if self._first_evidence is None:
             self._first_evidence = now
         step = self._steps.setdefault(k, Step())
         if len(self._steps) > self._most_steps and self.current is None:
             del self._steps[min(self._steps)]
         return step
-
-    def _is_from_the_future(self, k: int, now: int) -> bool:
-        """Whether a step is too far ahead to be true; were it believed, all else would be late."""
-        passed = 0 if self._heard_at is None else max(0, now - self._heard_at)
-        is_ahead = k > self._newest + FURTHEST + int(4 * passed * self.configuration.mesh.rate / SECOND)
-        self._counts["from the future"] += is_ahead
-        return is_ahead
 
     def _is_over(self, k: int) -> bool:
         assert self.current is not None
@@ -258,7 +243,7 @@ class Estimator(Node):
     def _steps_at_once(self) -> int:
         """A backlog stays bounded whatever comes: what is too much waits in the queue in front of the node."""
         assert self.current is not None
-        return max(MOST_AT_ONCE, self._newest - self.current - self._most_steps)
+        return max(MOST_AT_ONCE, self._signs.newest - self.current - self._most_steps)
 
     def _is_done_again(self, k: int) -> bool:
         """Whether the step was published before: all that a late message changes is told in one tick."""
@@ -266,30 +251,25 @@ class Estimator(Node):
 
     def _is_ready(self, k: int, step: Step, now: int) -> bool:
         if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
-            return bool(step.closed or step.arrived or self._newest > k)
+            return bool(step.closed or step.arrived or self._signs.newest > k)
         return self._is_overdue(k, now)
 
     def _is_overdue(self, k: int, now: int) -> bool:
-        sign = self._first_sign(k)
+        sign = self._signs.of(k)
         return sign is not None and now >= sign + self.deadline
-
-    def _first_sign(self, k: int) -> int | None:
-        """When the step, or one after it, was first heard of."""
-        i = bisect_left(self._signs, (k,))
-        return self._signs[i][1] if i < len(self._signs) else None
 
     def wakeup(self) -> int | None:
         if self._has_more:
             return 0
         if self.current is None:
             return None if self._first_evidence is None else self._first_evidence + START_GRACE
-        sign = self._first_sign(self.current)
+        sign = self._signs.of(self.current)
         waits = not self._combined or self.configuration.input_box is not None
         return sign + self.deadline if sign is not None and waits else None
 
     def _is_behind(self) -> bool:
         assert self.current is not None
-        return self._newest - self.current > BEHIND
+        return self._signs.newest - self.current > BEHIND
 
     def _close(self, k: int, step: Step, now: int) -> list[Message]:
         """Combine the step's data and publish the result if it is new."""
@@ -339,7 +319,7 @@ class Estimator(Node):
             elif self.configuration.input_box is not None and self._is_overdue(k, now):
                 u = self.configuration.input_box
             else:
-                self._waiting = f"input of step {k} ({input_key(self.configuration)})" if self._newest > k else ""
+                self._waiting = f"input of step {k} ({input_key(self.configuration)})" if self._signs.newest > k else ""
                 return False
         self._waiting = ""
         if step.input is not None:
@@ -349,7 +329,7 @@ class Estimator(Node):
             return False
         self.current, self._combined = k + 1, False
         self._steps.pop(k - self.remembered, None)  # one step forward, one is forgotten: never a search of the backlog
-        del self._signs[: bisect_left(self._signs, (k + 1 - self.history,))]
+        self._signs.forget_before(k + 1 - self.history)
         return True
 
     def _predict_set(self, k: int, u: Vector | Orthotope | None, now: int) -> bool:
@@ -499,16 +479,16 @@ class Estimator(Node):
         """As of every node, how far it is behind, and which sources have fallen silent."""
         found = super().complaints(now)
         if self.current is not None and self._is_behind():
-            late, unpublished = self._newest - self.current, self._counts["behind"]
+            late, unpublished = self._signs.newest - self.current, self._counts["behind"]
             text = f"behind by {late} steps; {unpublished:g} steps so far were done without being published"
             found.append(Complaint("WARN", text))
         last = self.configuration.mesh.steps
-        has_ended = last is not None and self._newest >= last  # nobody has anything to say any more
+        has_ended = last is not None and self._signs.newest >= last  # nobody has anything to say any more
         is_early = self._first_evidence is None
         return found + ([] if has_ended or is_early else self._silences.complaints(now))
 
     def counters(self) -> dict[str, float]:
-        return self._counts | {"epoch": self.epochs.number, "newest": self._newest}
+        return self._counts | {"epoch": self.epochs.number, "newest": self._signs.newest}
 
     def noise_bounds(self) -> Bounds:
         """rho and r in force."""

@@ -118,15 +118,15 @@ class FusionNode(Estimator):
 
     def _sense_silence(self, now: int) -> None:
         """When nothing at all has come for a while, steps go on by the clock; the set then grows, honestly."""
-        if self.current is None or self._heard_at is None or self.waiting_for():
+        if self.current is None or self._signs.heard_at is None or self.waiting_for():
             return
         period = SECOND / self.configuration.mesh.rate
         silence = max(SECOND, int(SILENT_STEPS * period)) + self.deadline
         last = self.configuration.mesh.steps
-        while now - self._heard_at > silence and (last is None or self._newest < last):
-            heard_at = self._heard_at + int(period)
-            self._see(self._newest + 1, now)
-            self._heard_at = heard_at
+        while now - self._signs.heard_at > silence and (last is None or self._signs.newest < last):
+            heard_at = self._signs.heard_at + int(period)
+            self._see(self._signs.newest + 1, now)
+            self._signs.heard_at = heard_at
             self._counts["silent steps"] += 1
 
     # -- fusion of one step

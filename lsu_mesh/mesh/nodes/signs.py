@@ -1,0 +1,50 @@
+"""When the steps were first heard of."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+
+FURTHEST = 4096
+"""So many steps, and four times those that the rate allows since the last message, a message may lie ahead."""
+MOST_SIGNS = 65536
+
+
+class Signs:
+    """The newest step, and when each step that was the newest was first heard of.
+
+    Parameters
+    ----------
+    rate:
+        Steps in a nanosecond.
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._known: list[tuple[int, int]] = []
+        """Step and time; both rise."""
+        self.newest = 0
+        self.heard_at: int | None = None
+        """When the last message came, of whatever step."""
+
+    def is_from_the_future(self, k: int, now: int) -> bool:
+        """Whether a step is too far ahead to be true; were it believed, all else would be late."""
+        passed = 0 if self.heard_at is None else max(0, now - self.heard_at)
+        return k > self.newest + FURTHEST + int(4 * passed * self._rate)
+
+    def note(self, k: int, now: int) -> None:
+        """Step k was heard of."""
+        self.heard_at = now
+        if k > self.newest:
+            self.newest = k
+            self._known.append((k, now))
+            if len(self._known) > MOST_SIGNS:
+                del self._known[: MOST_SIGNS // 2]
+
+    def of(self, k: int) -> int | None:
+        """When step k, or one after it, was first heard of."""
+        i = bisect_left(self._known, (k,))
+        return self._known[i][1] if i < len(self._known) else None
+
+    def forget_before(self, k: int) -> None:
+        """Nobody will ask for the steps before k."""
+        del self._known[: bisect_left(self._known, (k,))]
