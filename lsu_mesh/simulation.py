@@ -6,6 +6,7 @@ that starts again, or starts late, is at the current step at once and draws the 
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import math
 from typing import Literal, NamedTuple
@@ -35,9 +36,13 @@ class Simulation(NamedTuple):
 
 def generator(seed: int, name: str, step: int) -> np.random.Generator:
     """The generator of ``(seed, name, step)``: the key comes from seed and name, the counter from the step."""
-    digest = hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=16).digest()
-    key = np.frombuffer(digest, dtype="<u8")
-    return np.random.Generator(np.random.Philox(key=key, counter=np.array([0, step, 0, 0], dtype=np.uint64)))
+    counter = np.array([0, step, 0, 0], dtype=np.uint64)
+    return np.random.Generator(np.random.Philox(key=_philox_key(seed, name), counter=counter))
+
+
+@functools.lru_cache(maxsize=1024)
+def _philox_key(seed: int, name: str) -> NDArray[np.uint64]:
+    return np.frombuffer(hashlib.blake2b(f"{seed}/{name}".encode(), digest_size=16).digest(), dtype="<u8")
 
 
 def random_uniform(seed: int, name: str, step: int, size: int) -> Vector:

@@ -7,6 +7,7 @@ ordered and of one dimension gets past :func:`decode`.
 from __future__ import annotations
 
 import math
+import operator
 import re
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -371,7 +372,7 @@ def _check_box(lower: list[float], upper: list[float]) -> None:
     _check_finite("upper", upper)
     if len(lower) != len(upper):
         raise ValueError(f"lower has {len(lower)} entries, upper {len(upper)}")
-    if any(low > high for low, high in zip(lower, upper, strict=True)):
+    if any(map(operator.gt, lower, upper)):
         raise ValueError("lower > upper")
 
 

@@ -16,23 +16,23 @@ from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
-from lsu_mesh.supports.support import Matrix, Support
+from lsu_mesh.supports.support import Matrix, Support, Vector
 from lsu_mesh.supports.zonotope import Zonotope
 
 
 def to_support(message: SupportMessage) -> Support:
-    """The set that a message describes."""
+    """The set that a message describes; the message has checked its numbers."""
     if isinstance(message, OrthotopeMessage):
-        return Orthotope(message.lower, message.upper)
+        return Orthotope.trusted(_vector(message.lower), _vector(message.upper))
     if isinstance(message, IntersectionMessage):
         return Intersection([to_support(part) for part in message.parts])
-    generators = _matrix(message.generators, len(message.center))
+    center, generators = _vector(message.center), _matrix(message.generators, len(message.center))
     if isinstance(message, ParallelotopeMessage):
-        return Parallelotope(message.center, generators)
+        return Parallelotope.trusted(center, generators)
     if isinstance(message, ZonotopeMessage):
-        return Zonotope(message.center, generators)
+        return Zonotope(center, generators)
     A = np.array(message.A, dtype=np.float64).reshape(len(message.b), generators.shape[1])
-    return ConstrainedZonotope(message.center, generators, A, message.b)
+    return ConstrainedZonotope.of_arrays(center, generators, A, _vector(message.b))
 
 
 def to_message(support: Support) -> SupportMessage:
@@ -54,6 +54,10 @@ def to_message(support: Support) -> SupportMessage:
             b=support.b.tolist(),
         )
     raise TypeError(f"the protocol has no message for {type(support).__name__}")
+
+
+def _vector(values: list[float]) -> Vector:
+    return np.array(values, dtype=np.float64)
 
 
 def _matrix(rows: list[list[float]], height: int) -> Matrix:

@@ -26,15 +26,19 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> 
         raise ModelError(f"{name} must hold numbers: {error}") from error
     if array.size == 0 and array.ndim < len(shape):
         array = np.zeros(tuple(0 if length is None else length for length in shape))
-    fits = array.ndim == len(shape) and all(
-        want is None or got == want for got, want in zip(array.shape, shape, strict=True)
-    )
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         expected = " × ".join("any" if length is None else str(length) for length in shape)
         raise ModelError(f"{name} must have shape {expected}, it has shape {array.shape}")
-    if not np.isfinite(array).all():
+    if np.count_nonzero(np.isfinite(array)) != array.size:
         raise ModelError(f"{name} must hold finite numbers only")
-    return frozen(array)
+    array.setflags(write=False)
+    return array
+
+
+def _fits(shape: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    if len(shape) != len(wanted):
+        return False
+    return all(want is None or got == want for got, want in zip(shape, wanted, strict=True))
 
 
 def frozen(array: Array) -> Array:

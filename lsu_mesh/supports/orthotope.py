@@ -118,8 +118,8 @@ class Orthotope(Support):
     def to_constrained_zonotope(self) -> ConstrainedZonotope:
         from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 
-        n = self.dim
-        return ConstrainedZonotope(self.center, np.diag(self.half_widths), np.zeros((0, n)), np.zeros(0))
+        edges = np.diag(self.half_widths)
+        return ConstrainedZonotope.of_arrays(self.center, edges, np.zeros((0, self.dim)), np.zeros(0))
 
     def __repr__(self) -> str:
         return f"Orthotope(lower={self.lower.tolist()}, upper={self.upper.tolist()})"

@@ -131,7 +131,8 @@ class Parallelotope(Support):
     def to_constrained_zonotope(self) -> ConstrainedZonotope:
         from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 
-        return ConstrainedZonotope(self._center, self._generators, np.zeros((0, self.dim)), np.zeros(0))
+        no_rows = np.zeros((0, self._generators.shape[1]))
+        return ConstrainedZonotope.of_arrays(self._center, self._generators, no_rows, np.zeros(0))
 
     def __repr__(self) -> str:
         return f"Parallelotope(center={self._center.tolist()}, generators={self._generators.tolist()})"

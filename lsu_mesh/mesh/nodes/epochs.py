@@ -69,6 +69,8 @@ class Epochs:
         self.number = self._newest[self._own] = max(self.number, number)
 
     def _forget_old_boots(self, src: str) -> None:
+        if len(self._newest) <= MOST_BOOTS:
+            return
         boots = [peer for peer in self._newest if peer[0] == src and peer != self._own and peer not in self._relied]
         for peer in boots[: max(0, len(boots) - MOST_BOOTS)]:
             del self._newest[peer]

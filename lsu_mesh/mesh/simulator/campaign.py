@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import signal
 from collections import Counter
@@ -14,6 +15,8 @@ from lsu_mesh.mesh.simulator.run import Outcome, run_seed
 
 CHUNK = 4
 """Seeds that a process takes at once."""
+COLLECTED_AFTER = 200_000
+"""New objects after which a process looks for circles among them: runs make many objects and hardly a circle."""
 
 
 @dataclass
@@ -42,14 +45,21 @@ def run_seeds(
     """Outcomes in the order of the seeds."""
     one = partial(_one, file, steps, tuple(faults))
     if workers <= 1 or len(seeds) <= CHUNK:
-        yield from map(one, seeds)
+        before = gc.get_threshold()
+        gc.set_threshold(COLLECTED_AFTER)
+        try:
+            yield from map(one, seeds)
+        finally:
+            gc.set_threshold(*before)
         return
-    with multiprocessing.get_context("spawn").Pool(workers, _leave_interrupts_to_the_parent) as pool:
+    with multiprocessing.get_context("spawn").Pool(workers, _begin_worker) as pool:
         yield from pool.imap(one, seeds, chunksize=CHUNK)
 
 
-def _leave_interrupts_to_the_parent() -> None:
+def _begin_worker() -> None:
+    """Interrupts are the parent's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.set_threshold(COLLECTED_AFTER)
 
 
 def _one(file: Path, steps: int, faults: tuple[str, ...], seed: int) -> Outcome:
