@@ -19,7 +19,8 @@ from lsu_mesh.filters.arguments import (
 from lsu_mesh.filters.contradiction import strip_contradiction
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.gain import hull_gain
-from lsu_mesh.kernels.constrained import meet_sets, meet_strips
+from lsu_mesh.filters.joining import joined
+from lsu_mesh.kernels.constrained import meet_strips
 from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.arrays import box_volume
@@ -186,16 +187,18 @@ class LSUCZ(Filter):
         """
         other = checked_prior(self._model, support)
         own, before = self._held, self.bounds()
-        lower, upper = other.bounds()
-        box = np.maximum(before[0], lower), np.minimum(before[1], upper)
         try:
-            met = meet_sets(*self._held.body, *self._transferable(other))
-            self._hold(self._settled((self._held.body[0], *met), *box))
+            lower, upper = other.bounds()
+            box = np.maximum(before[0], lower), np.minimum(before[1], upper)
+            met = joined(own.body, before, other, self._most_transferred)
+            if met is own.body:  # it lies in the other set
+                return 0.0
+            self._hold(self._settled(met, *box))
         except InconsistentData as contradiction:
             raise InconsistentData(
                 f"the set of {self.kind} and the transferred set have no point in common"
             ) from contradiction
-        gain, is_reduced = hull_gain(before, self.bounds()), not self._limits.allow((own.body[0], *met))
+        gain, is_reduced = hull_gain(before, self.bounds()), not self._limits.allow(met)
         if is_reduced and gain < LITTLE_GAIN and self._size(own.body) <= self._size(self._held.body):
             self._hold(self._held._replace(body=own.body))
         return gain
@@ -248,13 +251,11 @@ class LSUCZ(Filter):
         low, high = ConstrainedZonotope.of_arrays(*body).ranges(directions)
         return float(np.log(np.maximum(high - low, np.finfo(np.float64).tiny)).sum())
 
-    def _transferable(self, other: Support) -> Body:
-        """The other set's arrays, or those of its box where it is far more complex than this filter's own."""
-        joined = other.to_constrained_zonotope()
+    @property
+    def _most_transferred(self) -> int | None:
+        """A set far more complex than this filter's own is taken by its box."""
         limit = self._limits.generators
-        if limit is not None and joined.generator_count > 3 * max(limit, self._model.state_count):
-            joined = other.interval_hull().to_constrained_zonotope()
-        return joined.arrays
+        return None if limit is None else 3 * max(limit, self._model.state_count)
 
     def _noiseless_output(self) -> tuple[Vector, Vector]:
         low, high = self.support.ranges(self._arrays.C)
