@@ -6,7 +6,6 @@ publishes, and predicts with the input. What comes late rewinds to its step. A m
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
@@ -493,8 +492,3 @@ class Estimator(Node):
     def noise_bounds(self) -> Bounds:
         """rho and r in force."""
         return Bounds(rho=self.engine.model.rho.tolist(), r=self.engine.model.r.tolist())
-
-
-def finite_or_none(value: float) -> float | None:
-    """A logarithm of volumes for a message: None where a set is flat, or became flat."""
-    return value if math.isfinite(value) else None

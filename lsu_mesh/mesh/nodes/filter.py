@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from lsu_mesh.errors import InconsistentData, UnboundedSupport
-from lsu_mesh.filters.filter import Filter
+from lsu_mesh.errors import InconsistentData
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import (
@@ -26,13 +24,13 @@ from lsu_mesh.mesh.messages import (
 )
 from lsu_mesh.mesh.nodes.adoption import adopted_model, is_due, make_engine
 from lsu_mesh.mesh.nodes.contradiction import Dropped, update_without_contradicting_strips, widen
-from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator, finite_or_none
+from lsu_mesh.mesh.nodes.described import described, finite_or_none, foretold
+from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND
-from lsu_mesh.mesh.nodes.step import Base, Combined, Status, Step
-from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, SOUND, Transfer
-from lsu_mesh.mesh.sets import to_message, to_support
-from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.parallelotope import Parallelotope
+from lsu_mesh.mesh.nodes.starts import Start, Starts
+from lsu_mesh.mesh.nodes.step import Combined, Status, Step
+from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, Transfer
+from lsu_mesh.mesh.sets import to_message
 from lsu_mesh.supports.support import Vector
 
 
@@ -54,22 +52,6 @@ class Updated:
     messages: Sequence[Message] = ()
 
 
-@dataclass(frozen=True)
-class Start:
-    """A sound set to start again from."""
-
-    set: object
-    """Snapshot of the engine that holds it."""
-    base: Base
-    words: str
-    used: Sequence[Reference] = ()
-    message: Fused | None = None
-
-    @property
-    def guarantee(self) -> str:
-        return "declared" if self.message is None else self.message.guarantee
-
-
 class FilterNode(Estimator):
     """Runs one filter of the library on the measurements of its sensors."""
 
@@ -89,8 +71,7 @@ class FilterNode(Estimator):
             start = self._rows[sensor].stop
         self._inconsistent: set[int] = set()
         """Steps in a row, up to the current one, whose data contradicted the set."""
-        self._fused: dict[str, Fused] = {}
-        """Newest sound set of each fusion."""
+        self._starts = Starts(self.epochs)
         self._is_tested = True
         """Whether data of a later step have agreed with the set of the mesh that the node started from."""
         self._started_at = 0
@@ -140,9 +121,7 @@ class FilterNode(Estimator):
         if isinstance(message, Fused):
             if message.name in self.settings.transfer_from:
                 self._transfer.note(message)
-            known = self._fused.get(message.name)
-            if message.status in SOUND and (known is None or message.step >= known.step):
-                self._fused[message.name] = message
+            self._starts.note(message)
         if self.current is None:
             self.take_candidate(message)
 
@@ -187,23 +166,13 @@ class FilterNode(Estimator):
         self.engine = make_engine(self.settings, adopted_model(self.configuration, self.settings, message), domain)
         self.best_guarantee = max(self.best_guarantee, "learned", key=WEAKNESS.index)
         self.reach.lose()
-        self._fused.clear()
+        self._starts.forget()
         self._inconsistent.clear()
         self.abandon_epoch("")
         self.start_from("domain", [message.reference])
         text = f"step {k}: adopted the bounds that {message.src} found; started again from the domain"
         about: About = {"step": k, "epoch": self.epochs.number, "source": message.src, "factor": message.factor}
         return [self.event("WARN", "bounds-adopted", text, now, k, about)]
-
-    def _contradicts(self, y: Vector) -> bool:
-        """Whether the data are proved to miss the set; it stays as it is."""
-        before = self.engine.snapshot()
-        try:
-            self.engine.update(y)
-        except InconsistentData:
-            return True
-        self.engine.restore(before)
-        return False
 
     def _stack(self, step: Step) -> tuple[Vector, list[Reference], int | None]:
         """Measured outputs by sensor name, then row, NaN where missing; what was used; the oldest sending time."""
@@ -382,50 +351,8 @@ class FilterNode(Estimator):
             self.rely(start.message)
 
     def _start_again(self, k: int, y: Vector, *, abandons: bool) -> Start | None:
-        """A set of step k, before its data, that is sound and meets them; ``None`` where there is none.
-
-        In this order: a fused set carried forward, if it does not descend from the epoch that is left; the prior
-        carried through every input; the domain.
-        """
-        before = self.engine.snapshot()
-        newest_first = sorted(self._fused.values(), key=lambda fused: -fused.step)
-        carried_on = (self._from_fused(fused, k, abandons) for fused in newest_first)
-        starts = [start for start in carried_on if start is not None]
-        for support, base, words in (
-            (self.reach.box, "reach", "the prior carried through all inputs"),
-            (self.engine.model.domain, "domain", "the domain"),
-        ):
-            if support is not None:
-                self.engine.reset(support)
-                starts.append(Start(self.engine.snapshot(), base, words))  # type: ignore[arg-type]
-        starts.sort(key=lambda start: start.guarantee != "declared")
-        met = None
-        for start in starts:
-            self.engine.restore(start.set)
-            if not self._contradicts(y):
-                met = start
-                break
-        self.engine.restore(before)
-        return met
-
-    def _from_fused(self, fused: Fused, k: int, abandons: bool) -> Start | None:
-        """A fused set of step k or before, carried to step k."""
-        if not k - OLDEST_BOX <= fused.step <= k or self.epochs.is_abandoned(fused):
-            return None
-        if abandons and self.epochs.is_descendant(fused):
-            return None
-        inputs, used = self.inputs(), []
-        self.engine.reset(to_support(fused.support))
-        for j in range(fused.step, k):
-            u = inputs.get(j)
-            if self.engine.model.input_count and u is None:
-                return None
-            try:
-                self.engine.predict(None if u is None else np.array(u.u))
-            except (InconsistentData, UnboundedSupport):
-                return None
-            used += [] if u is None else [u.reference]
-        return Start(self.engine.snapshot(), fused.reference, f"the fused set of step {fused.step}", used, fused)
+        """A set of step k, before its data, that is sound and meets them; ``None`` where there is none."""
+        return self._starts.find(self.engine, k, y, self.reach.box, self.inputs(), abandons=abandons)
 
     def _start_from_candidate(self) -> bool:
         if not super()._start_from_candidate():
@@ -470,31 +397,3 @@ class FilterNode(Estimator):
                 guarantee=self.guarantee,
             )
         ]
-
-
-def described(engine: Filter) -> dict[str, Any]:
-    """What a posterior says of the engine's set, beside the set itself."""
-    lower, upper = engine.bounds()
-    own = engine.support
-    is_plain = isinstance(own, Orthotope | Parallelotope)
-    log_volume = own.log_volume() if is_plain else Orthotope(lower, upper).log_volume()
-    return {
-        "lower": lower.tolist(),
-        "upper": upper.tolist(),
-        "point": engine.point.tolist(),
-        "log_volume": finite_or_none(log_volume),
-        "volume_of": "support" if is_plain else "hull",
-    }
-
-
-def foretold(engine: Filter) -> dict[str, Any]:
-    """What a prediction says of the engine's set, beside the set itself."""
-    lower, upper = engine.bounds()
-    band = engine.predict_output()
-    return {
-        "lower": lower.tolist(),
-        "upper": upper.tolist(),
-        "y_lower": band.lower.tolist(),
-        "y_upper": band.upper.tolist(),
-        "y_point": band.point.tolist(),
-    }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -15,13 +14,13 @@ from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
-from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator, finite_or_none
+from lsu_mesh.mesh.nodes.described import described_box
+from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint
 from lsu_mesh.mesh.nodes.quarantine import Quarantine, Say
 from lsu_mesh.mesh.nodes.step import Combined, Status, Step
 from lsu_mesh.mesh.nodes.transfer import SOUND
 from lsu_mesh.mesh.sets import to_support
-from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
 
 MOST_FAMILIES = 64
@@ -342,7 +341,7 @@ class FusionNode(Estimator):
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
         return Fused(
             **self.stamp("fused", k, now, combined.origin),
-            **described(*self._met),
+            **described_box(*self._met),
             kind="fusion",
             support=support,
             status=combined.status,
@@ -360,14 +359,3 @@ class FusionNode(Estimator):
             rejected=self._rejected,
             quarantined=sorted(self._quarantine.members),
         )
-
-
-def described(lower: Vector, upper: Vector) -> dict[str, Any]:
-    """What a fused set's message says of its bounds (n,), (n,)."""
-    return {
-        "lower": lower.tolist(),
-        "upper": upper.tolist(),
-        "point": (lower + 0.5 * (upper - lower)).tolist(),
-        "log_volume": finite_or_none(Orthotope(lower, upper).log_volume()),
-        "volume_of": "hull",
-    }

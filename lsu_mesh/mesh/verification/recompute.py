@@ -15,11 +15,9 @@ from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Bounds, Measurement, Posterior, Prediction, Reference, Suggestion
-from lsu_mesh.mesh.nodes import fusion as fusion_node
 from lsu_mesh.mesh.nodes.adoption import adopted_model, is_due, make_engine
 from lsu_mesh.mesh.nodes.contradiction import update_without_contradicting_strips, widen
-from lsu_mesh.mesh.nodes.estimator import finite_or_none
-from lsu_mesh.mesh.nodes.filter import described, foretold
+from lsu_mesh.mesh.nodes.described import described, described_box, finite_or_none, foretold
 from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.nodes.transfer import Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
@@ -269,7 +267,7 @@ class FusionRecomputation(Recomputation):
         else:
             self._intersected(brought.sources, alone)
         self._engine.resume(self._engine.support, *self._met)
-        return {**fusion_node.described(*self._met), "kind": "fusion", "bounds": self._noise_bounds()}
+        return {**described_box(*self._met), "kind": "fusion", "bounds": self._noise_bounds()}
 
     def _intersected(self, sources: Sequence[Posterior], alone: bool) -> None:
         if alone:

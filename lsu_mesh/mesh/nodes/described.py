@@ -1,0 +1,55 @@
+"""What messages say of a set, beside the set itself."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.parallelotope import Parallelotope
+from lsu_mesh.supports.support import Vector
+
+
+def described(engine: Filter) -> dict[str, Any]:
+    """What a posterior says of the engine's set."""
+    lower, upper = engine.bounds()
+    own = engine.support
+    is_plain = isinstance(own, Orthotope | Parallelotope)
+    log_volume = own.log_volume() if is_plain else Orthotope(lower, upper).log_volume()
+    return {
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
+        "point": engine.point.tolist(),
+        "log_volume": finite_or_none(log_volume),
+        "volume_of": "support" if is_plain else "hull",
+    }
+
+
+def foretold(engine: Filter) -> dict[str, Any]:
+    """What a prediction says of the engine's set and its outputs."""
+    lower, upper = engine.bounds()
+    band = engine.predict_output()
+    return {
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
+        "y_lower": band.lower.tolist(),
+        "y_upper": band.upper.tolist(),
+        "y_point": band.point.tolist(),
+    }
+
+
+def described_box(lower: Vector, upper: Vector) -> dict[str, Any]:
+    """What a fused set's message says of its bounds (n,), (n,)."""
+    return {
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
+        "point": (lower + 0.5 * (upper - lower)).tolist(),
+        "log_volume": finite_or_none(Orthotope(lower, upper).log_volume()),
+        "volume_of": "hull",
+    }
+
+
+def finite_or_none(value: float) -> float | None:
+    """A logarithm of volumes for a message: None where a set is flat, or became flat."""
+    return value if math.isfinite(value) else None
