@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import psutil
 from live_mesh import LiveMesh, Observer, Seen, TrueStates, holds
 
 MIB = 2**20
@@ -53,6 +55,10 @@ class Report:
     p99_ms: float
     memory: dict[str, list[float]] = field(default_factory=dict)
     """MiB of each peer, once a second."""
+    cores: dict[str, float] = field(default_factory=dict)
+    """Share of one processor that each peer has used."""
+    load: tuple[float, float] = (0.0, 0.0)
+    """Of the machine, at the begin and at the end."""
 
     def growth(self, name: str) -> float:
         """MiB from the third quarter to the last, by their medians."""
@@ -77,17 +83,18 @@ class Report:
             f"{self.seconds / 60:.1f} minutes at {self.rate:g} Hz: {self.inside} of {self.estimates} estimates hold "
             f"the truth, {self.lost:g} messages lost, {self.behind:g} steps finished without publication, "
             f"{self.lag} steps behind at the end; a fused set came {self.p50_ms:.1f} ms after its oldest measurement "
-            f"was sent (p99 {self.p99_ms:.1f} ms)."
+            f"was sent (p99 {self.p99_ms:.1f} ms). Load {self.load[0]:.1f} at the start, {self.load[1]:.1f} at the end."
         )
         lines = [
             told,
             "",
-            "| peer | memory in the 1st quarter | 2nd | 3rd | 4th | grows by |",
-            "|---|---|---|---|---|---|",
+            "| peer | share of a core | memory in the 1st quarter | 2nd | 3rd | 4th | grows by |",
+            "|---|---|---|---|---|---|---|",
         ]
         for name, samples in self.memory.items():
             medians = [f"{statistics.median(quarter):.1f} MiB" for quarter in quarters(samples)]
-            lines.append(f"| {name} | {' | '.join(medians)} | {self.growth(name):+.1f} MiB |")
+            cells = (name, f"{self.cores[name]:.0%}", *medians, f"{self.growth(name):+.1f} MiB")
+            lines.append(f"| {' | '.join(cells)} |")
         return "\n".join(lines)
 
 
@@ -106,11 +113,13 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
         mesh.until(lambda: len(observer.last_step) == len(mesh.estimators()), "estimates flow")
         processes = {name: mesh.process(name) for _, name in mesh.peers}
         memory: dict[str, list[float]] = {name: [] for name in processes}
-        began = time.monotonic()
+        began, load, used = time.monotonic(), os.getloadavg()[0], _processor_seconds(processes)
         while time.monotonic() - began < seconds:
             for name, process in processes.items():
                 memory[name].append(process.memory_info().rss / MIB)
             time.sleep(min(1.0, seconds / 40))
+        took, now_used = time.monotonic() - began, _processor_seconds(processes)
+        cores = {name: (now_used[name] - used[name]) / took for name in processes}
         lag = mesh.due() - min(observer.last_step.values())
         behind = sum(health[-1][1].counters.get("behind", 0.0) for health in observer.health.values())
         cuts = statistics.quantiles(observer.latencies_ms, n=100)
@@ -124,4 +133,12 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
         )
         lost = sum(mesh.gaps().values())
         rate = mesh.configuration.mesh.rate
-        return Report(seconds, rate, observer.count, observer.inside, lost, behind, lag, cuts[49], cuts[98], memory)
+        return Report(
+            seconds, rate, observer.count, observer.inside, lost, behind, lag, cuts[49], cuts[98], memory, cores,
+            (load, os.getloadavg()[0]),
+        )  # fmt: skip
+
+
+def _processor_seconds(processes: Mapping[str, psutil.Process]) -> dict[str, float]:
+    times = {name: process.cpu_times() for name, process in processes.items()}
+    return {name: spent.user + spent.system for name, spent in times.items()}
