@@ -47,7 +47,7 @@ INPUT_LOST = 256
 MOST_STEPS = 4096
 """Steps that are remembered while something is waited for, or twice those that publishers keep where these are more."""
 MOST_AT_ONCE = 1024
-"""Steps done in one tick, the next tick goes on; more only where more than ``MOST_STEPS`` wait."""
+"""Steps done in one tick, the next tick goes on; more only where more than this would be left."""
 MOST_MESSAGES = 32
 """So much to publish and a tick ends, the next tick goes on: nobody waits for the first until the last is done."""
 MOST_USED = 2048
@@ -242,7 +242,7 @@ class Estimator(Node):
     def _steps_at_once(self) -> int:
         """A backlog stays bounded whatever comes: what is too much waits in the queue in front of the node."""
         assert self.current is not None
-        return max(MOST_AT_ONCE, self._signs.newest - self.current - self._most_steps)
+        return max(MOST_AT_ONCE, self._signs.newest - self.current - MOST_AT_ONCE)
 
     def _is_done_again(self, k: int) -> bool:
         """Whether the step was published before: all that a late message changes is told in one tick."""
