@@ -107,6 +107,10 @@ class Bus:
             )
         )
 
+    def subscribe_live(self, key: str) -> None:
+        """Queue what is published from now on under a key expression; what is missed stays missing."""
+        self._declared.append(self._session.declare_subscriber(key, self._enqueue_sample))
+
     def _enqueue_sample(self, sample: Any) -> None:
         self._arrivals.put(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
 

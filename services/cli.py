@@ -9,6 +9,8 @@ from typing import NoReturn
 
 from services.arguments import (
     bench,
+    doctor,
+    graph,
     health,
     identify,
     keys,
@@ -20,12 +22,29 @@ from services.arguments import (
     simulate,
     validate,
     view,
+    watch,
 )
 from services.arguments.parsing import EXIT_CODES
 from services.stop import Stop, leave
 
 OK, FAILURE, USAGE, COULD_NOT_START, NOT_MET = 0, 1, 2, 3, 4
-GROUPS = (run, peer, validate, health, keys, view, replay, recording, simulate, identify, reproduce, bench)
+GROUPS = (
+    run,
+    peer,
+    validate,
+    doctor,
+    graph,
+    watch,
+    health,
+    keys,
+    view,
+    replay,
+    recording,
+    simulate,
+    identify,
+    reproduce,
+    bench,
+)
 """In the order of ``lsu-mesh --help``."""
 
 

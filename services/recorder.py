@@ -84,6 +84,8 @@ class RecorderService:
         self._sequence = 0
         self._next_health = 0
         self._links = -1
+        self._queue = self._longest_ns = 0
+        """The longest queue and turn since the last health message."""
         self._roles = {name: role for role, name in configuration.peers()}
 
     def declare(self) -> None:
@@ -97,7 +99,8 @@ class RecorderService:
 
     def turn(self) -> None:
         """Take what has come, then flush if it is time."""
-        self._take_all(MOST_AT_ONCE)
+        began, self._queue = self._clock.now(), max(self._queue, self._bus.waiting())
+        taken = self._take_all(MOST_AT_ONCE)
         now = self._clock.now()
         self._recovery.look(now, self._bus.waiting())
         self._recorder.tick(now)
@@ -106,6 +109,8 @@ class RecorderService:
             self._links = links
             self._next_health = now + 1_000_000_000
             self._tell_health(now)
+        if taken:
+            self._longest_ns = max(self._longest_ns, self._clock.now() - began)
 
     def finish(self) -> None:
         """Take what is under way, hear no more, and record all that has come; the file is closed by who opened it."""
@@ -142,8 +147,9 @@ class RecorderService:
         problems = list(self._recorder.problems)
         if self._bus.dropped:
             problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
-        counters = self._gate.counters | {"queue": float(self._bus.waiting()), "dropped": float(self._bus.dropped)}
-        counters["links"] = float(self._links)
+        counters = self._gate.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}
+        counters |= {"links": float(self._links), "step_ms": self._longest_ns * 1e-6}
+        self._queue = self._longest_ns = 0
         counters |= {f"flushed {flushed}": float(seq) for flushed, seq in self._recorder.flushed.items()}
         health = Health(
             v=VERSION, src=f"{ROLE_NAME}/{ROLE_NAME}", boot=self._boot, seq=self._sequence, step=0, sent_ns=now,

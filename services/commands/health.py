@@ -19,8 +19,9 @@ from services.cli import COULD_NOT_START, NOT_MET, OK, USAGE
 from services.commands.configuration import load_or_explain, session_settings
 from services.security import InsecureSession
 
-SHOWN = ("received", "gaps", "duplicates", "late", "rewinds", "contradictions", "queue", "step_ms")
-"""Counters with a column of their own; refusals are summed."""
+SHOWN = ("received", "gaps", "duplicates", "dropped", "late", "rewinds", "contradictions", "behind", "queue", "step_ms")
+"""Counters with a column of their own; refusals are summed, and told by reason below the table."""
+TITLES = {"contradictions": "contra", "step_ms": "step ms"}
 
 
 def main(options: argparse.Namespace) -> int:
@@ -71,6 +72,12 @@ def print_json(peers: Sequence[PeerHealth]) -> None:
         print(json.dumps(about | {"step": peer.step, "age_s": age, "counters": dict(peer.counters)}))
 
 
+def refusals(peer: PeerHealth) -> dict[str, float]:
+    """How many messages the peer has refused, by reason."""
+    counters = peer.counters.items()
+    return {name.removeprefix("refused."): count for name, count in counters if name.startswith("refused.")}
+
+
 def print_table(peers: Sequence[PeerHealth]) -> None:
     """One row per peer, its reasons below."""
     from rich.console import Console
@@ -80,14 +87,16 @@ def print_table(peers: Sequence[PeerHealth]) -> None:
     table = Table(box=None, pad_edge=False, header_style="bold")
     for title in ("", "role", "level"):
         table.add_column(title)
-    for title in ("step", *SHOWN, "refused"):
+    for title in ("step", *(TITLES.get(name, name) for name in SHOWN), "refused"):
         table.add_column(title, justify="right")
     for peer in peers:
-        refused = sum(count for name, count in peer.counters.items() if name.startswith("refused."))
-        counts = [f"{peer.counters[name]:g}" if name in peer.counters else "–" for name in SHOWN]
-        table.add_row(peer.name, peer.role, peer.level, str(peer.step), *counts, f"{refused:g}")
+        counts = [f"{peer.counters[name]:.6g}" if name in peer.counters else "–" for name in SHOWN]
+        table.add_row(peer.name, peer.role, peer.level, str(peer.step), *counts, f"{sum(refusals(peer).values()):g}")
     console.print(table)
     for peer in peers:
+        if refused := refusals(peer):
+            by_reason = ", ".join(f"{count:g} by {reason}" for reason, count in refused.items())
+            console.print(f"{peer.role}/{peer.name} has refused {by_reason}", markup=False, soft_wrap=True)
         for reason in peer.reasons:
             console.print(f"{peer.level} {peer.role}/{peer.name}: {reason}", markup=False, soft_wrap=True)
     console.print(f"the mesh: {worst([peer.level for peer in peers])}")

@@ -29,7 +29,7 @@ from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.nodes.signs import Signs
-from lsu_mesh.mesh.nodes.silence import Silences, input_key
+from lsu_mesh.mesh.nodes.silence import Silences, input_key, start_keys
 from lsu_mesh.mesh.nodes.step import Base, Combined, Step
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
@@ -52,8 +52,6 @@ MOST_MESSAGES = 32
 """So much to publish and a tick ends, the next tick goes on: nobody waits for the first until the last is done."""
 MOST_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
-
-
 WEAKNESS: tuple[Guarantee, ...] = ("declared", "learned", "none")
 
 
@@ -402,7 +400,8 @@ class Estimator(Node):
             self._begin(first, domain, "domain", restarted=True)
             return True
         missing = next((j for j in range(1, first + 1) if self._input_missing(j)), first)
-        self._waiting = f"a sound set to start from, or the inputs since step {missing}"
+        inputs = f"the inputs since step {missing} ({input_key(self.configuration)})"
+        self._waiting = f"a sound set to start from ({start_keys(self)}), or {inputs}"
         return False
 
     def _start_from_candidate(self) -> bool:

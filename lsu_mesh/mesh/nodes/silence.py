@@ -6,8 +6,8 @@ from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.keys import key
-from lsu_mesh.mesh.nodes.node import SECOND, Complaint
+from lsu_mesh.mesh.keys import key, last_key
+from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 
 STRANGE_SILENCE = 2 * SECOND
 """A source that says nothing for longer, and for longer than usual, is complained of."""
@@ -59,3 +59,11 @@ class Silences:
 def input_key(configuration: Configuration) -> str:
     """The key that inputs come under."""
     return key(configuration.mesh.name, "input", configuration.plant.name if configuration.plant is not None else "*")
+
+
+def start_keys(node: Node) -> str:
+    """The keys under which a set may come that an estimator can start from."""
+    mesh = node.configuration.mesh.name
+    own = [last_key(mesh, node.name)] if node.role == "filter" else []
+    sets = [key(mesh, topic, name) for topic, name in node.subscriptions() if topic in ("posterior", "fused")]
+    return ", ".join([*own, *sets])

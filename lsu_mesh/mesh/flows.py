@@ -1,0 +1,52 @@
+"""Who publishes what to whom: the edges of a mesh, from its configuration alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lsu_mesh.mesh.access import EVERY_PEER, PUBLISHES, subscriptions
+from lsu_mesh.mesh.config.settings import Configuration
+
+Peer = tuple[str, str]
+"""``(role, name)``."""
+
+
+@dataclass(frozen=True)
+class Flow:
+    """One key: its publisher, and the peers that subscribe to it."""
+
+    topic: str
+    name: str
+    role: str
+    """Of the publisher."""
+    readers: tuple[Peer, ...]
+
+    @property
+    def address(self) -> str:
+        """``topic/name``."""
+        return f"{self.topic}/{self.name}"
+
+
+def in_order(configuration: Configuration) -> list[Peer]:
+    """Every peer, as data flow: sources first, the recorder last."""
+    order = list(PUBLISHES)
+    return sorted(configuration.peers(), key=lambda peer: order.index(peer[0]))
+
+
+def flows(configuration: Configuration) -> list[Flow]:
+    """Every key that peers of the configuration publish: sources first, health and events last.
+
+    A plant without inputs publishes none. A recorder reads everything.
+    """
+    peers = in_order(configuration)
+    listened = {peer: set(subscriptions(configuration, *peer)) for peer in peers}
+    own = [(role, name, topic) for role, name in peers for topic in PUBLISHES[role]]
+    told = [(role, name, topic) for topic in EVERY_PEER for role, name in peers]
+    if not configuration.base_model.input_count:
+        own = [(role, name, topic) for role, name, topic in own if topic != "input"]
+    return [
+        Flow(
+            topic, name, role, tuple(peer for peer in peers if peer[0] == "recorder" or (topic, name) in listened[peer])
+        )
+        for role, name, topic in [*own, *told]
+    ]
