@@ -72,6 +72,12 @@ def print_json(peers: Sequence[PeerHealth]) -> None:
         print(json.dumps(about | {"step": peer.step, "age_s": age, "counters": dict(peer.counters)}))
 
 
+def _shown(name: str, count: float | None) -> str:
+    if count is None:
+        return "–"
+    return f"{count:.1f}" if name.endswith("_ms") else f"{count:.0f}"
+
+
 def refusals(peer: PeerHealth) -> dict[str, float]:
     """How many messages the peer has refused, by reason."""
     counters = peer.counters.items()
@@ -90,7 +96,7 @@ def print_table(peers: Sequence[PeerHealth]) -> None:
     for title in ("step", *(TITLES.get(name, name) for name in SHOWN), "refused"):
         table.add_column(title, justify="right")
     for peer in peers:
-        counts = [f"{peer.counters[name]:.6g}" if name in peer.counters else "–" for name in SHOWN]
+        counts = [_shown(name, peer.counters.get(name)) for name in SHOWN]
         table.add_row(peer.name, peer.role, peer.level, str(peer.step), *counts, f"{sum(refusals(peer).values()):g}")
     console.print(table)
     for peer in peers:
