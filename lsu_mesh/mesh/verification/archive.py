@@ -51,8 +51,32 @@ class Archive:
             self._posteriors[message.src, message.boot, message.step].append(message)
 
     def sets(self) -> list[Posterior | Prediction]:
-        """Everything that claims to hold the state, in the order of arrival."""
-        return [message for message in self._messages.values() if isinstance(message, Posterior | Prediction)]
+        """Everything that claims to hold the state, in the order of arrival, but each after what it was made from.
+
+        Messages of one process on several keys may overtake one another on their way to the recorder.
+        """
+        ordered: dict[Reference, Posterior | Prediction] = {}
+        begun: set[Reference] = set()  # what is begun and not yet in order is being waited for: a circle is not closed
+        for message in self._messages.values():
+            waiting = [message] if isinstance(message, Posterior | Prediction) else []
+            while waiting:
+                one = waiting[-1]
+                begun.add(one.reference)
+                ahead = [other for other in self._made_from(one) if other.reference not in begun]
+                if ahead:
+                    waiting += ahead
+                else:
+                    ordered.setdefault(one.reference, waiting.pop())
+        return list(ordered.values())
+
+    def _made_from(self, message: Posterior | Prediction) -> list[Posterior | Prediction]:
+        """The sets that a set was made from, as far as they are here."""
+        if isinstance(message, Prediction):
+            earlier = self._posteriors_before(message)
+            return [max(earlier, key=lambda posterior: posterior.seq)] if earlier else []
+        base = [message.base] if isinstance(message.base, tuple) else []
+        found = [self._messages.get(reference) for reference in (*base, *message.used)]
+        return [other for other in found if isinstance(other, Posterior | Prediction)]
 
     def find(self, reference: Reference, kind: type[Kind]) -> Kind:
         """The message that is called so. Raises :class:`Unverifiable` where it is not there."""
@@ -69,12 +93,16 @@ class Archive:
 
         Raises :class:`Unverifiable` where it is not there.
         """
-        step = prediction.step - 1
-        listed = self._posteriors.get((prediction.src, prediction.boot, step), [])
-        earlier = [posterior for posterior in listed if posterior.sent_ns <= prediction.sent_ns]
+        earlier = self._posteriors_before(prediction)
         if not earlier:
-            raise Unverifiable(f"the posterior of step {step} from the same process is not in the recording")
+            text = f"the posterior of step {prediction.step - 1} from the same process is not in the recording"
+            raise Unverifiable(text)
         return max(earlier, key=lambda posterior: posterior.seq)
+
+    def _posteriors_before(self, prediction: Prediction) -> list[Posterior]:
+        """Revisions of the posterior of the step before that the process had published by then."""
+        listed = self._posteriors.get((prediction.src, prediction.boot, prediction.step - 1), [])
+        return [posterior for posterior in listed if posterior.sent_ns <= prediction.sent_ns]
 
     def input_vector(self, step: int) -> Vector | None:
         """The input that drives ``step`` on, (p,); None where none is recorded."""

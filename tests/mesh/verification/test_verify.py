@@ -264,3 +264,40 @@ def test_fusions_of_fusions(mesh_of: MakeMesh) -> None:
     mesh.run(1.5)
     check(mesh)
     assert mesh.posteriors("top")
+
+
+@pytest.mark.parametrize("kind", ["WindowMAP", "TruncatedKalman", "LSUO"])
+def test_messages_that_overtake_one_another_on_their_way_to_the_recorder(mesh_of: MakeMesh, kind: str) -> None:
+    options = (f'filters.box.kind="{kind}"', 'fusion.main.sources=["cz", "para"]', 'filters.para.transfer="predictor"')
+    mesh = mesh_of("mesh.steps=60", *options, *DOMAIN)
+    mesh.run(1.5)
+    messages = recorded(mesh)
+    order = np.argsort(np.arange(len(messages)) + np.random.default_rng(4).uniform(0.0, 60.0, len(messages)))
+    shuffled = [messages[i] for i in order]
+    found, in_order = verify(mesh.configuration, shuffled), verify(mesh.configuration, messages)
+    assert [str(missing) for missing in found.unverifiable[:3]] == []
+    assert found.holds
+    assert found.exact == in_order.exact
+    assert found.containment.excused == in_order.containment.excused
+
+
+def test_excuses_do_not_depend_on_the_order_of_arrival(mesh_of: MakeMesh) -> None:
+    """A prediction that comes before the posterior it was made from rests on the same broken sensor."""
+    mesh = mesh_of("mesh.steps=60", "sensors.s2.simulated_r=[0.6]", *DOMAIN)
+    mesh.run(1.5)
+    messages = recorded(mesh)
+    found = verify(mesh.configuration, sorted(messages, key=lambda message: isinstance(message, Posterior)))
+    assert found.containment.excused == verify(mesh.configuration, messages).containment.excused
+    assert found.containment.excused["sensor s2"] > 10
+    assert found.holds
+
+
+def test_a_circle_of_bases_ends(mesh_of: MakeMesh) -> None:
+    mesh = mesh_of("mesh.steps=10")
+    mesh.run(1.0)
+    messages = recorded(mesh)
+    at = [i for i, m in enumerate(messages) if isinstance(m, Posterior) and m.name == "box"][3:5]
+    for i, other in (at, at[::-1]):
+        messages[i] = structs.replace(messages[i], base=messages[other].reference)  # type: ignore[type-var]
+    found = verify(mesh.configuration, messages)
+    assert [difference.peer for difference in found.differences[:1]] == ["filter/box"]
