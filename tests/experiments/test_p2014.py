@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from lsu_mesh.experiments import p2006, p2014, p2014_figures, p2014_runs, p2014_tables
+from lsu_mesh.experiments import p2014, p2014_figures, p2014_runs, p2014_tables
 from lsu_mesh.experiments.comparison import VERDICTS
 from lsu_mesh.experiments.p2014_runs import CORRELATED, KNOWN, UNCORRELATED, A, C, F, Job, estimator, result, simulate
 from lsu_mesh.experiments.p2014_tables import NINEFOLD, TABLE_I, TABLE_II, TABLE_III, THRICE, WELL
@@ -152,13 +152,6 @@ def test_every_number_of_the_papers_tables_has_a_verdict(monkeypatch: pytest.Mon
         rows = tables[f"p2014-table-{name}"].rows
         assert all(str(row[-1]).startswith((*VERDICTS, "–")) for row in rows)
     assert p2014_tables.WELL in {row[0] for row in third}
-
-
-def test_the_experiments_tell_a_verdict_in_every_row() -> None:
-    outcome = p2006.run(quick=True)
-    assert all(check.is_met for check in outcome.checks)
-    statements = outcome.tables[1].rows
-    assert [str(row[-1]).split(":")[0] for row in statements] == ["reproduced", "reproduced", "not reproduced"]
 
 
 @pytest.mark.soak
