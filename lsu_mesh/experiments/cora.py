@@ -27,6 +27,8 @@ Box = tuple[Vector, Vector]
 TITLE = "Althoff, Rath (2021): Comparison of guaranteed state estimators, Automatica 130; numbers of the CORA toolbox"
 QUICK = ("LSUO", "LSUPB", "LSUCZ(20, 8)")
 OURS, PUBLISHED = "here", "published"
+TICKS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+"""Of the axis of ratios."""
 ROUNDING = 1e-6
 """Share of a radius by which published numbers may fall short of the exact hull: they come from other solvers."""
 
@@ -182,7 +184,13 @@ def draw(b: Benchmark, ratios: Mapping[str, Ratio]) -> Figure:
     axes.set_xscale("log")
     axes.set_xlim(left=0.9)
     axes.axvline(1.0, color="black", linewidth=0.8)
-    axes.set_xlabel("mean radius ÷ exact radius")
+    highest = max(ratio for _, ratio, _ in bars)
+    ticks = [tick for tick in TICKS if tick <= 1.2 * highest]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xticks([], minor=True)
+    axes.grid(True, axis="x", linewidth=0.3)
+    axes.set_axisbelow(True)
+    axes.set_xlabel("mean radius ÷ exact radius (line: exact hull)")
     axes.set_title(b.name, fontsize=10)
     axes.legend(loc="upper right", fontsize=8)
     return figure

@@ -65,8 +65,8 @@ def draw(surfaces: Surfaces, plan: Plan) -> Figure:
         axes = figure.add_subplot(1, 2, i + 1, projection="3d")
         values = surfaces.of(plan.system, name)
         axes.plot_surface(rho, r, values, cmap="viridis", edgecolor="#404040", linewidth=0.3, antialiased=True)
-        if np.ptp(values) == 0.0:  # a share, of nothing or of all
-            axes.set_zlim(*((99.0, 101.0) if values[0, 0] else (0.0, 1.0)))
+        if name.startswith("P"):
+            axes.set_zlim(*_percent_limits(float(values.min()), float(values.max())))
         axes.set_xlabel("ρ", fontsize=9)
         axes.set_ylabel("r", fontsize=9)
         axes.set_title(f"{plan.system}: {name}\n{MEANING[name]}", fontsize=9)
@@ -74,3 +74,10 @@ def draw(surfaces: Surfaces, plan: Plan) -> Figure:
         axes.view_init(elev=25, azim=-130)
     figure.subplots_adjust(left=0.02, right=0.94, bottom=0.06, top=0.86, wspace=0.12)
     return figure
+
+
+def _percent_limits(low: float, high: float) -> tuple[float, float]:
+    """Of an axis of shares: at least one point, so that what hardly varies looks so, and nothing above 100."""
+    if high - low >= 1.0:
+        return low, high
+    return (min(np.floor(low), 99.0), 100.0) if high > 50.0 else (0.0, max(1.0, np.ceil(high)))

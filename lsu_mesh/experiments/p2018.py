@@ -9,7 +9,16 @@ from lsu_mesh.experiments import p2018_noise
 from lsu_mesh.experiments.comparison import Row, compared, ours, stated, table
 from lsu_mesh.experiments.effect import Effect
 from lsu_mesh.experiments.outcome import SPREAD, Cell, Check, Column, Outcome, Spread, Table, between
-from lsu_mesh.experiments.p2018_figures import Timing, draw_states, draw_times, exponent, timings
+from lsu_mesh.experiments.p2018_figures import (
+    Timing,
+    draw_states,
+    draw_times,
+    exponent,
+    states,
+    states_table,
+    times_table,
+    timings,
+)
 from lsu_mesh.experiments.p2018_runs import ESTIMATORS, KAPPA, START, STATISTICS, STEPS, WINDOW, Job, Result, result
 from lsu_mesh.experiments.workers import Watch, part, spread, unwatched
 
@@ -56,7 +65,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     seeds = range(seed, seed + (QUICK_RUNS if quick else RUNS))
     found = results(seeds, part(watch, 0.0, 0.9))
     noise = p2018_noise.errors(seed, 3 if quick else NOISE_RUNS)
-    times = timings(seed)
+    times, shown = timings(seed), states(seed)
     effect = Effect.of(noise.values)
     rows = [
         *_rows(found),
@@ -69,11 +78,13 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
             table("p2018-table-1", title, ["estimator", "quantity"], rows),
             _ours(found, len(seeds)),
             _times(found, times),
+            states_table(shown),
             p2018_noise.table(noise),
+            times_table(times),
         ],
         checks(found),
         {
-            "p2018-figure-1": partial(draw_states, seed),
+            "p2018-figure-1": partial(draw_states, shown),
             "p2018-figure-2": partial(p2018_noise.draw_errors, noise),
             "p2018-figure-3-times": partial(draw_times, times),
         },

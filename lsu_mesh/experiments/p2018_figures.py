@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from lsu_mesh.experiments.outcome import Cell, Column, Table
 from lsu_mesh.experiments.p2018_runs import data_of, prior
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.filters.run import run_filter
@@ -18,6 +20,7 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Array = NDArray[np.float64]
 FIRST, LAST = 40, 70
 """Steps that Figure 1 shows."""
 DIMENSIONS = (2, 3, 5, 8, 12, 20, 30)
@@ -25,20 +28,43 @@ TIMED_STEPS = 200
 ROUNDS = 5
 
 
-def draw_states(seed: int) -> Figure:
-    """Simulated and estimated states of P3 with the orthotopic bounds (13), zoomed."""
-    from matplotlib.figure import Figure
+class States(NamedTuple):
+    """What Figure 1 shows, each (steps, 3): simulated and estimated states of P3, and the orthotopic bounds (13)."""
 
+    simulated: Array
+    estimated: Array
+    lower: Array
+    upper: Array
+
+
+def states(seed: int) -> States:
+    """A part of one run."""
     model, data = data_of(seed, LAST)
     record = run_filter(LSUO(model, prior(model), meet=False), data.Y, data.U)
+    shown = slice(FIRST - 1, LAST)
+    return States(*(values[shown] for values in (data.X, record.points, record.lower, record.upper)))
+
+
+def states_table(found: States) -> Table:
+    """The data of Figure 1."""
+    columns = [Column("t"), *(Column(f"{name} x{i}") for i in (1, 2, 3) for name in States._fields)]
+    rows: list[tuple[Cell, ...]] = [
+        (FIRST + k, *(float(values[k, i]) for i in range(3) for values in found)) for k in range(LAST - FIRST + 1)
+    ]
+    return Table("p2018-figure-1-data", "States and bounds", tuple(columns), rows, is_for_files=True)
+
+
+def draw_states(found: States) -> Figure:
+    """Simulated and estimated states with their bounds."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(6.4, 6.0), layout="constrained")
     steps = np.arange(FIRST, LAST + 1)
-    shown = slice(FIRST - 1, LAST)
     for i, axes in enumerate(figure.subplots(3, 1, sharex=True)):
-        axes.plot(steps, data.X[shown, i], "-.", color="#808080", label="simulated")
-        axes.plot(steps, record.points[shown, i], "-", color="black", label="estimated")
-        for bound, label in ((record.lower, "bounds"), (record.upper, "")):
-            axes.plot(steps, bound[shown, i], ":", color="#1f5fa8", linewidth=1.2, label=label)
+        axes.plot(steps, found.simulated[:, i], "-.", color="#808080", label="simulated")
+        axes.plot(steps, found.estimated[:, i], "-", color="black", label="estimated")
+        for bound, label in ((found.lower, "bounds"), (found.upper, "")):
+            axes.plot(steps, bound[:, i], ":", color="#1f5fa8", linewidth=1.2, label=label)
         axes.set_ylabel(f"$x_{{t,{i + 1}}}$")
         axes.grid(True, linewidth=0.3)
     axes.set_xlabel("step t")
@@ -78,6 +104,12 @@ def exponent(times: Sequence[Timing]) -> float:
     upper = times[len(times) // 2 :]
     slope, _ = np.polyfit(np.log([t.states for t in upper]), np.log([t.microseconds for t in upper]), 1)
     return float(slope)
+
+
+def times_table(times: Sequence[Timing]) -> Table:
+    """The data of Figure 3."""
+    columns = (Column("states"), Column("µs per step"))
+    return Table("p2018-figure-3-times-data", "Time of a step", columns, list(times), is_for_files=True)
 
 
 def draw_times(times: Sequence[Timing]) -> Figure:

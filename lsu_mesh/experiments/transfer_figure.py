@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = {"LSUO lp": "#d1495b", "LSUPB": "#00798c", "LSUCZ": "#8d6a9f"}
+STYLES = {"LSUO lp": ("#d1495b", "^"), "LSUPB": ("#1a1a1a", "o"), "LSUCZ": ("#8fa3d8", "s")}
+"""Colour, of another grey each, and mark by filter."""
 PANELS: Sequence[tuple[str, Callable[[Result], float]]] = (
     ("width ÷ isolated", lambda result: result.width),
     ("TNSE ÷ isolated", lambda result: result.tnse_ratio),
@@ -41,11 +42,12 @@ def draw_transfer(results: Sequence[Result]) -> Figure:
 
 def _draw_panel(axes: Axes, results: Sequence[Result], value: Callable[[Result], float]) -> None:
     for kind in dict.fromkeys(result.kind for result in results):
+        colour, mark = STYLES[kind]
         for way, style in (("predictor", "-"), ("data-predictor", "--")):
             line = [result for result in results if (result.kind, result.way) == (kind, way)]
             axes.semilogx(
-                [r.ratio for r in line], [value(r) for r in line], style, color=COLOURS[kind], linewidth=1.4,
-                marker="o", markersize=2.5, label=f"{kind}, {way}",
+                [r.ratio for r in line], [value(r) for r in line], style, color=colour, linewidth=1.4,
+                marker=mark, markersize=3.5, label=f"{kind}, {way}",
             )  # fmt: skip
     axes.grid(True, linewidth=0.3)
     axes.tick_params(labelsize=8)

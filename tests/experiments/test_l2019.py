@@ -12,6 +12,7 @@ from lsu_mesh.experiments import l2019
 from lsu_mesh.experiments.l2019_criteria import SETTLED, START, WITHOUT_INPUT, Job, criteria, prior, with_zonotopes
 from lsu_mesh.experiments.l2019_figures import draw, plans
 from lsu_mesh.experiments.l2019_overlap import overlap
+from lsu_mesh.experiments.l2019_seeds import of_seeds, ratio
 from lsu_mesh.experiments.l2019_surfaces import PAPER_NAMES, Surfaces
 from lsu_mesh.experiments.monte_carlo import draw as draw_noise
 from lsu_mesh.experiments.monte_carlo import simulate_all
@@ -112,6 +113,16 @@ def test_numbers_to_reach_on_s1_and_s2() -> None:
         assert all((values == 0.0).all() for key, values in row.items() if "outside" in key[1])
 
 
+def test_seeds_below_the_range_are_named() -> None:
+    """The ratio of a cell is that of its criteria; what falls short is told, not left out."""
+    job = Job("S2", 0.1, (0.1,), 4, 60, 2)
+    found = criteria(job)
+    assert ratio(job) == pytest.approx(found["LSUO", "T outputs"].mean() / found["LSUP", "T outputs"].mean(), rel=1e-12)
+    assert of_seeds({1: 76.0, 2: 90.0}).verdict == "reproduced"
+    told = of_seeds({1: 76.0, 2: 61.0, 3: 54.0}).verdict
+    assert told.startswith("not reproduced: seeds 2, 3 are below 75, down to 54:")
+
+
 def test_lsucz_is_the_tightest_and_loses_nothing() -> None:
     found = with_zonotopes(Job("S2", 0.1, (0.1,), 1, 60, 1))
     volumes = {name: values.mean() for (name, criterion), values in found.items() if criterion == "V"}
@@ -140,6 +151,19 @@ def test_a_figure_has_two_named_surfaces_over_rho_and_r() -> None:
     figure = draw(surfaces, next(plans()))
     assert [axes.get_title().split("\n")[0] for axes in figure.axes] == ["S1: T1", "S1: T2"]
     assert {(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes} == {("ρ", "r")}
+
+
+@pytest.mark.parametrize(
+    ("values", "limits"), [((0.0, 0.0), (0.0, 1.0)), ((100.0, 100.0), (99.0, 100.0)), ((99.97, 99.99), (99.0, 100.0)),
+                           ((99.6, 99.6), (99.0, 100.0)), ((98.7, 99.2), (98.0, 100.0)), ((60.0, 72.0), (60.0, 72.0))]
+)  # fmt: skip
+def test_shares_that_hardly_vary_look_so(values: tuple[float, float], limits: tuple[float, float]) -> None:
+    surfaces = Surfaces((0.01, 0.1), (0.01, 0.1))
+    grid = np.array([[values[0], values[1]], [values[1], values[1]]])
+    surfaces.mean = {("S1", *PAPER_NAMES[name]): grid for name in ("P1", "P2")}
+    plan = next(plan for plan in plans() if plan.pair == ("P1", "P2"))
+    for axes in draw(surfaces, plan).axes:
+        assert axes.get_zlim() == pytest.approx(limits)  # type: ignore[attr-defined]
 
 
 @pytest.mark.soak

@@ -9,9 +9,19 @@ import pytest
 
 from lsu_mesh.experiments import p2018, p2018_noise
 from lsu_mesh.experiments.effect import Effect
-from lsu_mesh.experiments.p2018_figures import draw_states, draw_times, exponent, timings
-from lsu_mesh.experiments.p2018_runs import ESTIMATORS, STATISTICS, Job, result
+from lsu_mesh.experiments.p2018_figures import (
+    FIRST,
+    LAST,
+    draw_states,
+    draw_times,
+    exponent,
+    states,
+    states_table,
+    timings,
+)
+from lsu_mesh.experiments.p2018_runs import ESTIMATORS, STATISTICS, Job, data_of, prior, result
 from lsu_mesh.experiments.p2018_runs import statistics as rows_of
+from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.simulation import Simulation
 
 
@@ -60,9 +70,28 @@ def test_errors_grow_with_both_noises() -> None:
     assert min(effect) > 1.5
 
 
+def test_figure_1_shows_the_steps_of_a_filter_that_goes_one_by_one() -> None:
+    found = states(1)
+    model, data = data_of(1, LAST)
+    filter = LSUO(model, prior(model), meet=False)
+    for k in range(LAST):
+        filter.update(data.Y[k])
+        if k + 1 >= FIRST:
+            lower, upper = filter.bounds()
+            row = k + 1 - FIRST
+            for values, shown in ((data.X[k], found.simulated), (filter.point, found.estimated)):
+                np.testing.assert_array_equal(shown[row], values)
+            np.testing.assert_array_equal([found.lower[row], found.upper[row]], [lower, upper])
+            assert (lower <= data.X[k]).all()
+            assert (data.X[k] <= upper).all()
+            assert states_table(found).rows[row][:2] == (k + 1, data.X[k, 0])
+        if k + 1 < LAST:
+            filter.predict(data.U[k])
+
+
 def test_the_figures_are_named() -> None:
-    states = draw_states(1)
-    assert [axes.get_ylabel() for axes in states.axes] == ["$x_{t,1}$", "$x_{t,2}$", "$x_{t,3}$"]
+    drawn = draw_states(states(1))
+    assert [axes.get_ylabel() for axes in drawn.axes] == ["$x_{t,1}$", "$x_{t,2}$", "$x_{t,3}$"]
     times = timings(1)
     axes = draw_times(times).axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("number of states", "µs per step")
