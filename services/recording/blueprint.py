@@ -20,6 +20,10 @@ FEW = 4
 """Filters whose sets can be told apart in one view."""
 WINDOW = 100
 """Steps that plots of bands show."""
+SETTLING = 20
+"""So many steps are left out of plots over the whole run: the first sets are as wide as the prior and hide the rest."""
+MARGIN = 0.14
+"""Share of a plot over the whole run that stays free for its legend."""
 Part = rrb.View | rrb.Container
 
 
@@ -31,7 +35,9 @@ def blueprint(names: Names) -> rrb.Blueprint:
         tabs.append(_grid("States", [_bands(names, i) for i in range(len(names.states))]))
     tabs += [_filter(names, name, settings.kind) for name, settings in configuration.filters.items()]
     tabs += [_fusion(names, name) for name in configuration.fusion]
-    tabs += [_grid("Outputs", [_output(names, output) for output in names.outputs]), _mesh(), _events()]
+    tabs += [_grid("Outputs", [_output(names, output) for output in names.outputs])]
+    tabs += [_half_widths(names)] if names.learners else []
+    tabs += [_mesh(names), _events()]
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
         rrb.BlueprintPanel(state="collapsed"),
@@ -47,20 +53,20 @@ def _overview(names: Names) -> Part:
     if len(shown) > OVERVIEW_STATES:
         shown = list(dict.fromkeys([*names.axes(), *shown]))[:OVERVIEW_STATES]
     plots = [_bands(names, i) for i in shown]
-    share = min(0.05 + 0.04 * len(names.estimators), 0.4)
+    share = min(0.08 + 0.042 * len(names.estimators), 0.4)
     space = _space(names, frame.ALL, _sets_of_all(names))
     left = rrb.Vertical(space, _status(), row_shares=[1.0 - share, share])
     columns = 1 if len(plots) <= 3 else 2
-    volume = _whole("Log-volume of the sets", ["/log_volume/**"])
+    volume = _volume(names)
     rows = -(-len(plots) // columns)
     right = rrb.Vertical(rrb.Grid(*plots, grid_columns=columns), volume, row_shares=[rows, 1])
     return rrb.Horizontal(left, right, column_shares=[2, 3], name="Overview")
 
 
 def _filter(names: Names, name: str, kind: str) -> Part:
-    below = [_plot(names, "Widths", [path("widths", name)])]
+    below = [_plot(names, "Widths", [path("widths", name)], legend=True)]
     if names.configuration.filters[name].transfer != "off":
-        below.append(_plot(names, "Gain of the transfers [nat]", [path("gain", name)], legend=False))
+        below.append(_plot(names, "Gain of the transfers [nat]", [path("gain", name)]))
     space = _space(names, name, [_set_of(name)])
     left = rrb.Vertical(space, *below, row_shares=[3.0] + [1.0] * len(below))
     return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=f"{name} ({kind})")
@@ -70,11 +76,12 @@ def _fusion(names: Names, name: str) -> Part:
     several = len(names.configuration.fusion) > 1
     few = len(names.configuration.filters) <= FEW
     space = _space(names, frame.ALL, _sets_of_all(names)) if few else _space(names, name, [_set_of(name)])
+    share = min(0.08 + 0.042 * len(names.configuration.fusion[name].sources), 0.4)
     left = rrb.Vertical(
         space,
-        _whole("Log-volume of the sets", ["/log_volume/**"]),
+        _volume(names),
         rrb.StateTimelineView(name="Sources", origin="/", contents=[f"{path('trust', name)}/**"]),
-        row_shares=[4, 2, 1.2],
+        row_shares=[0.64 * (1.0 - share), 0.36 * (1.0 - share), share],
     )
     title = f"Fusion {name}" if several else "Fusion"
     return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=title)
@@ -92,9 +99,27 @@ def _states_of(names: Names, peer: str) -> Part:
     return rrb.Tabs(_grid("Bands", bands), _grid("Errors", errors), active_tab=0)
 
 
-def _mesh() -> Part:
+def _half_widths(names: Names) -> Part:
+    """What is known of the noise: by how much bounds fail, and the half-widths in force at every filter."""
+    configuration = names.configuration
+    outputs = [output for output in names.outputs if any(output in names.outputs_of_watcher(w) for w in names.learners)]
+    r = [
+        _whole(names, f"r of {output.label}", [f"{path('half_widths', 'r', output.sensor, output.part)}/**"])
+        for output in outputs
+    ]
+    rho = [_whole(names, f"rho of {part}", [f"{path('half_widths', 'rho', part)}/**"]) for part in names.disturbances]
+    kinds = {one.learn for one in configuration.identifiers.values()}
+    plots = r + rho if kinds != {"r"} or len(names.learners) > len(configuration.identifiers) else r
+    if not configuration.identifiers:
+        return _grid("Bounds", plots)
+    title = "By what the bounds must be multiplied to explain the data; above 1 they fail"
+    factor = _whole(names, title, ["/factor/**"])
+    return rrb.Vertical(factor, _grid("Half-widths", plots), row_shares=[1, 3], name="Bounds")
+
+
+def _mesh(names: Names) -> Part:
     health = rrb.StateTimelineView(name="Processes", origin="/", contents=["/health/**"])
-    latency = _whole("Age of the oldest measurement at arrival [ms]", ["/latency/**"])
+    latency = _whole(names, "Age of the oldest measurement at arrival [ms]", ["/latency/**"])
     topology = rrb.GraphView(name="Who sends to whom", origin="/topology")
     left = rrb.Vertical(topology, latency, row_shares=[3, 2])
     right = rrb.Vertical(_status(), health, row_shares=[1, 2])
@@ -118,10 +143,11 @@ def _grid(name: str, views: Sequence[Part]) -> Part:
 def _bands(names: Names, state: int, peer: str | None = None) -> Part:
     part = names.states[state]
     shown = f"{path('bands', part)}/**" if peer is None else path("bands", part, peer)
-    seen = "truth (pink), bounds of all peers" if names.truth_is_known else "bounds of all peers"
-    title = names.label(state) if peer else f"{names.label(state)}: {seen}"
+    whose = "the bounds of all peers" if peer is None else "its bounds"
+    seen = f"the truth (pink) and {whose}" if names.truth_is_known else whose
+    title = f"{names.label(state)}: {seen}"
     crowded = [] if peer else [path("bands", part, name) for name in _outlined(names)]
-    return _plot(names, title, [shown, path("truth", part)], legend=peer is not None and state == 0, outlined=crowded)
+    return _plot(names, title, [shown, path("truth", part)], outlined=crowded)
 
 
 def _outlined(names: Names) -> list[str]:
@@ -132,7 +158,7 @@ def _outlined(names: Names) -> list[str]:
 
 def _errors(names: Names, state: int, peer: str) -> Part:
     part = names.states[state]
-    return _plot(names, f"{names.label(state)} − truth", [path("errors", part, peer)], legend=state == 0)
+    return _plot(names, f"{names.label(state)} − truth", [path("errors", part, peer)])
 
 
 def _output(names: Names, output: Output) -> Part:
@@ -143,7 +169,6 @@ def _output(names: Names, output: Output) -> Part:
         names,
         f"{output.label}: measured (grey), and predicted by the filters",
         contents,
-        legend=False,
         outlined=outlined,
     )
 
@@ -157,7 +182,7 @@ def _plot(
     name: str,
     contents: list[str],
     *,
-    legend: bool = True,
+    legend: bool = False,
     outlined: Sequence[str] = (),
 ) -> Part:
     """Series in a window of steps that ends at the cursor; all such plots share their time axis."""
@@ -172,15 +197,38 @@ def _plot(
         origin="/",
         contents=contents,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        plot_legend=rrb.PlotLegend(visible=legend),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
         time_ranges=window,
         overrides={entity: outline() for entity in outlined} or None,
     )
 
 
-def _whole(name: str, contents: list[str]) -> Part:
-    """Series over the whole run."""
-    return rrb.TimeSeriesView(name=name, origin="/", contents=contents)
+def _volume(names: Names) -> Part:
+    return _whole(names, "Log-volume of the sets", ["/log_volume/**"])
+
+
+def _whole(names: Names, name: str, contents: list[str]) -> Part:
+    """Series over the whole run but for its beginning, with room for the legend at the right."""
+    mesh = names.configuration.mesh
+    first = SETTLING if mesh.steps is None else min(SETTLING, mesh.steps // 10)
+    room = WINDOW if mesh.steps is None else max(1, round(MARGIN * mesh.steps))
+    now = rrb.TimeRangeBoundary.cursor_relative()
+    from_step, from_time = (
+        rrb.TimeRangeBoundary.absolute(seq=first),
+        rrb.TimeRangeBoundary.absolute(seconds=first * mesh.dt),
+    )
+    until = rrb.TimeRangeBoundary.cursor_relative(seq=room)
+    return rrb.TimeSeriesView(
+        name=name,
+        origin="/",
+        contents=contents,
+        axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(from_step, until)),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        time_ranges=[
+            rrb.VisibleTimeRange(STEP, start=from_step, end=now),
+            rrb.VisibleTimeRange(SIM_TIME, start=from_time, end=now),
+        ],
+    )
 
 
 def _set_of(name: str) -> str:

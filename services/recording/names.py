@@ -1,25 +1,28 @@
 """Where things lie in a recording, and how they are called there.
 
-=====================================  ===================================================================
-``/raw/<topic>/<name>``                every message as it came: payload, key, arrival
-``/raw/refused``                       payloads that are no message of this mesh
-``/truth/<state>``                     true state
-``/bands/<state>/<peer>``              interval, with lower, point and upper, of a filter or a fusion
-``/errors/<state>/<peer>``             point − truth, lower − truth, upper − truth
-``/widths/<peer>``                     widths of the interval hull, one series per state
-``/log_volume/<peer>``                 natural logarithm of the volume
-``/gain/<peer>``                       gain of a step's Bayesian transfers, in nats
-``/measured/<sensor>/<output>``        measured outputs
-``/outputs/<sensor>/<output>/<peer>``  predicted interval of the output
-``/space/sets/<peer>``                 set in three coordinates, ``…/edges`` its edges
-``/space/truth``                       the true state among the sets
-``/space/frames/<peer>``               place and scale at which views look, ``…/axes`` the axes
-``/status/<peer>``                     status of the posterior; ``/health/<peer>`` how the process does
-``/trust/<fusion>/<source>``           what the fusion does with a source
-``/topology``                          peers and who listens to whom
-``/events/<peer>``                     events as text
-``/latency/<peer>``                    age of the oldest measurement at the arrival of the posterior, in ms
-=====================================  ===================================================================
+===========================================  =======================================================================
+``/raw/<topic>/<name>``                      every message as it came: payload, key, arrival
+``/raw/refused``                             payloads that are no message of this mesh
+``/truth/<state>``                           true state
+``/bands/<state>/<peer>``                    interval, with lower, point and upper, of a filter or a fusion
+``/errors/<state>/<peer>``                   point − truth, lower − truth, upper − truth
+``/widths/<peer>``                           widths of the interval hull, one series per state
+``/log_volume/<peer>``                       natural logarithm of the volume
+``/gain/<peer>``                             gain of a step's Bayesian transfers, in nats
+``/measured/<sensor>/<output>``              measured outputs
+``/outputs/<sensor>/<output>/<peer>``        predicted interval of the output
+``/space/sets/<peer>``                       set in three coordinates, ``…/edges`` its edges
+``/space/truth``                             the true state among the sets
+``/space/frames/<peer>``                     place and scale at which views look, ``…/axes`` the axes
+``/status/<peer>``                           status of the posterior; ``/health/<peer>`` how the process does
+``/trust/<fusion>/<source>``                 what the fusion does with a source
+``/topology``                                peers and who listens to whom
+``/events/<peer>``                           events as text
+``/half_widths/rho/<state>/<peer>``          half-widths of the disturbance, and
+``/half_widths/r/<sensor>/<output>/<peer>``  of a sensor's noise: in force at a filter, or suggested by an identifier
+``/factor/<identifier>``                     by what the half-widths in force must be multiplied to explain the data
+``/latency/<peer>``                          age of the oldest measurement at the arrival of the posterior, in ms
+===========================================  =======================================================================
 """
 
 from __future__ import annotations
@@ -32,7 +35,7 @@ import rerun as rr
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.settings import SensorSettings
-from lsu_mesh.mesh.messages import Measurement, Message, Posterior, Prediction, Truth
+from lsu_mesh.mesh.messages import Measurement, Message, Posterior, Prediction, Suggestion, Truth
 
 
 @lru_cache(maxsize=4096)
@@ -65,6 +68,10 @@ class Output:
         """Entity of the interval that a filter predicts."""
         return path("outputs", self.sensor, self.part, peer)
 
+    def half_width(self, peer: str) -> str:
+        """Entity of the half-width of the noise, in force at a filter or suggested."""
+        return path("half_widths", "r", self.sensor, self.part, peer)
+
 
 @dataclass(frozen=True)
 class Names:
@@ -85,6 +92,18 @@ class Names:
         object.__setattr__(self, "outputs", tuple(listed))
 
     @property
+    def disturbances(self) -> tuple[str, ...]:
+        """Entity path part of each component of the disturbance: the states' names where each has its own."""
+        model = self.configuration.base_model
+        return self.states if model.noise_map is None else tuple(f"w{i + 1}" for i in range(len(model.rho)))
+
+    @property
+    def learners(self) -> tuple[str, ...]:
+        """Peers by which half-widths may change: identifiers, and filters that estimate them."""
+        filters = [name for name, one in self.configuration.filters.items() if one.kind == "WindowMAP"]
+        return (*self.configuration.identifiers, *filters)
+
+    @property
     def truth_is_known(self) -> bool:
         """Whether there is a simulated plant; real measurements come without the truth."""
         return self.configuration.plant is not None
@@ -100,6 +119,10 @@ class Names:
             _check_count("outputs", len(message.y), len(self.configuration.sensors[message.name].C))
         elif isinstance(message, Prediction):
             _check_count("outputs", len(message.y_lower), len(self.outputs_of_filter(message.name)))
+        elif isinstance(message, Suggestion):
+            found = sum(map(len, message.r.values()))
+            _check_count("half-widths of outputs", found, len(self.outputs_of_watcher(message.name)))
+            _check_count("half-widths of the disturbance", len(message.rho), len(self.disturbances))
 
     def label(self, state: int) -> str:
         """Name of a state with its unit, such as ``position [m]``."""
@@ -114,7 +137,14 @@ class Names:
 
     def outputs_of_filter(self, name: str) -> tuple[Output, ...]:
         """Outputs in the order of a filter's rows of C: sensors by name, then rows."""
-        chosen = self.configuration.filters[name].sensors
+        return self._outputs_of(self.configuration.filters[name].sensors)
+
+    def outputs_of_watcher(self, name: str) -> tuple[Output, ...]:
+        """Outputs of a filter or an identifier: sensors by name, then rows."""
+        watchers = self.configuration.filters | self.configuration.identifiers
+        return self._outputs_of(watchers[name].sensors)
+
+    def _outputs_of(self, chosen: Sequence[str]) -> tuple[Output, ...]:
         return tuple(output for sensor in sorted(chosen) for output in self.outputs if output.sensor == sensor)
 
 

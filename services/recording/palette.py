@@ -24,6 +24,7 @@ FILTERS: tuple[Color, ...] = (
     (110, 160, 60),
     (120, 110, 140),
 )
+IDENTIFIER: Color = (235, 60, 60)
 OTHER: Color = (125, 135, 145)
 ABSENT: Color = (150, 150, 150)
 

@@ -12,11 +12,12 @@ from typing import NamedTuple
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.ledger import Ledger
-from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Truth
+from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Suggestion, Truth
 from services.recording import palette
 from services.recording.bounded import ends_within
 from services.recording.estimates import Estimates
 from services.recording.events import Events
+from services.recording.half_widths import HalfWidths
 from services.recording.names import Names
 from services.recording.outputs import Outputs
 from services.recording.raw import RawStore
@@ -94,6 +95,7 @@ class Recorder:
         self._estimates = Estimates(stream, timelines, names, colors)
         self._space = Space(stream, timelines, names, colors)
         self._outputs = Outputs(stream, timelines, names, colors)
+        self._half_widths = HalfWidths(stream, timelines, names, colors)
         self._status = StatusLanes(stream, timelines, configuration)
         self._events = Events(stream, timelines)
         self._topology = Topology(stream, timelines, configuration, colors)
@@ -160,7 +162,8 @@ class Recorder:
         self._store()
 
     def _send_drawings(self) -> None:
-        for part in (self._estimates, self._space, self._outputs, self._status, self._events, self._topology):
+        parts = self._estimates, self._space, self._outputs, self._half_widths
+        for part in (*parts, self._status, self._events, self._topology):
             self._guarded(f"drawing {type(part).__name__.lower()}", part.flush)
 
     def _store(self) -> None:
@@ -212,7 +215,10 @@ class Recorder:
         if isinstance(message, Posterior):
             self._estimates.add(message, arrival_ns)
             self._space.add(message, arrival_ns)
+            self._half_widths.add(message, arrival_ns)
             self._status.add(message, arrival_ns)
+        elif isinstance(message, Suggestion):
+            self._half_widths.add_suggestion(message, arrival_ns)
         elif isinstance(message, Truth):
             self._estimates.add_truth(message, arrival_ns)
             self._space.add_truth(message, arrival_ns)

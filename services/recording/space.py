@@ -32,6 +32,7 @@ REMEMBERED = 256
 SHARE = 0.15
 """Largest share of the wall clock that may go into bodies."""
 
+FLAT = rr.components.PointShading.Flat
 Array = NDArray[np.float64]
 
 
@@ -203,10 +204,11 @@ class Space:
         self._stream.send_columns(path("space", "truth"), times, columns)
 
     def _style(self, colors: dict[str, Color]) -> None:
-        truth = rr.Points3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(6.0))
+        label = {"labels": ["truth"], "show_labels": True} if len(self._axes) > 1 else {}
+        truth = rr.Points3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(7.0), point_shading=FLAT, **label)
         self._stream.log(path("space", "truth"), truth, static=True)
         for peer, color in colors.items():
-            mesh = rr.Mesh3D.from_fields(albedo_factor=(*color, 90 if peer in self._fusions else 25))
+            mesh = rr.Mesh3D.from_fields(albedo_factor=(*color, 50 if peer in self._fusions else 25))
             self._stream.log(path("space", "sets", peer), mesh, static=True)
             edges = rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(1.2))
             self._stream.log(path("space", "sets", peer, "edges"), edges, static=True)

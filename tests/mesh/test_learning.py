@@ -146,3 +146,8 @@ def test_what_cannot_be_meant_is_said(root: Path, override: str, words: str) -> 
             root / "examples" / "learning.toml",
             [override, *(['filters.cz.transfer="predictor"'] if "transfer" in override else [])],
         )
+
+
+def test_the_identifier_goes_on_looking_when_its_window_is_full(mesh: LocalMesh) -> None:
+    looks = [(suggestion.first, suggestion.last) for suggestion in suggestions(mesh)]
+    assert looks == [(max(1, last - 149), last) for last in range(50, 401, 50)], "every 50 steps, of the last 150"

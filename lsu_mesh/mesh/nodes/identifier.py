@@ -73,8 +73,8 @@ class IdentifierNode(Node):
             return []
         self._looked_at = last
         first = max(1, last - self.settings.window + 1)
-        self._forget_before(last + every - self.settings.window)
         record = self._record(first, last)
+        self._forget_before(last + every - self.settings.window)
         return [] if record is None else self._look(record, first, last, now)
 
     def _is_whole(self, k: int) -> bool:
