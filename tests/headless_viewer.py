@@ -24,6 +24,8 @@ VULKAN_DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
 PATIENCE_S = 60.0
 HARMLESS = ("Software rasterizer detected",)
 """Warnings about the machine, not about the recording."""
+GLIDE_S, SLOWEST_S = 0.5, 10.0
+"""Plots glide to their ranges. Pictures so far apart that are equal show that they are there; the longest to wait."""
 TOASTS_S = 6.0
 """How long the viewer's own greetings cover a corner."""
 
@@ -121,10 +123,25 @@ class HeadlessViewer:
         recordings = self._require_client().get_state().recordings
         return max(int(line.end or 0) for r in recordings for line in r.timelines if line.name == "step")
 
-    def picture(self, path: Path, settle_s: float = 0.7) -> None:
-        """Save what is seen now, once the viewer's greetings are gone."""
-        time.sleep(max(settle_s, self._started + TOASTS_S - time.monotonic()))
-        self._require_client().save_screenshot(str(path))
+    def picture(self, path: Path, *, settled: bool = True) -> None:
+        """Save what is seen once the viewer's greetings are gone; ``settled``: once nothing moves any more."""
+        time.sleep(max(GLIDE_S, self._started + TOASTS_S - time.monotonic()))
+        self._save(path)
+        end, before = time.monotonic() + SLOWEST_S, b""
+        while settled and path.read_bytes() != before and time.monotonic() < end:
+            before = path.read_bytes()
+            time.sleep(GLIDE_S)
+            self._save(path)
+
+    def _save(self, path: Path) -> None:
+        def saved() -> bool:
+            try:
+                self._require_client().save_screenshot(str(path))
+            except TimeoutError:  # its own patience is short on a busy machine
+                return False
+            return True
+
+        self._wait("a picture is taken", saved)
 
     def complaints(self) -> list[str]:
         """Reports of the views and warnings of the viewer since the recording was opened."""

@@ -101,9 +101,12 @@ def _readable(width: float) -> float:
 
 
 def _fits(half_widths: Array, scale: Array) -> bool:
+    """Whether what is shown fills the view: on every axis, or on the largest where all share one scale."""
     shares = half_widths / scale
-    thin = shares[(shares > 0) & (shares < 0.05)]
-    return bool(0.5 <= shares.max() <= 1.1 and (thin.size == 0 or scale.max() > UNIFORM * scale.min()))
+    is_shared = bool((scale == scale[0]).all())
+    extended = shares[shares > 0]
+    smallest = 0.5 / UNIFORM if is_shared else 0.3
+    return bool(0.5 <= shares.max() <= 1.1 and extended.min() >= smallest)
 
 
 def _padded(values: Array, filling: float) -> Array:

@@ -141,8 +141,8 @@ class Names:
 
     def outputs_of_watcher(self, name: str) -> tuple[Output, ...]:
         """Outputs of a filter or an identifier: sensors by name, then rows."""
-        watchers = self.configuration.filters | self.configuration.identifiers
-        return self._outputs_of(watchers[name].sensors)
+        watcher = self.configuration.filters.get(name) or self.configuration.identifiers[name]
+        return self._outputs_of(watcher.sensors)
 
     def _outputs_of(self, chosen: Sequence[str]) -> tuple[Output, ...]:
         return tuple(output for sensor in sorted(chosen) for output in self.outputs if output.sensor == sensor)

@@ -32,6 +32,10 @@ REMEMBERED = 256
 SHARE = 0.15
 """Largest share of the wall clock that may go into bodies."""
 
+CROSS = 1.1
+"""Reach of the lines through the truth, in units of the view."""
+IN_FRONT = 0.03
+"""How far in front of flat sets the truth is drawn."""
 FLAT = rr.components.PointShading.Flat
 Array = NDArray[np.float64]
 
@@ -47,6 +51,13 @@ class _Set(NamedTuple):
 class _Drawn(NamedTuple):
     moment: Moment
     body: Body
+
+
+class _Truth(NamedTuple):
+    moment: Moment
+    place: Array
+    reach: Array
+    """How far the cross through it goes, per coordinate."""
 
 
 class Space:
@@ -70,9 +81,10 @@ class Space:
         self._failed: Exception | None = None
         self._shown: set[str] = set()
         self._estimators = set(names.estimators)
-        self._points: list[tuple[Moment, list[float]]] = []
+        self._points: list[_Truth] = []
         self._frames = {name: frame.Frame(stream, timelines, names, name) for name in (frame.ALL, *names.estimators)}
-        self._half_widths: dict[str, Array] = {}
+        self._extents: dict[str, tuple[Array, Array]] = {}
+        """Of every peer's last body, (lower, upper)."""
         self._fusions = set(names.configuration.fusion)
         self._style(colors)
         _load_solvers()
@@ -95,7 +107,7 @@ class Space:
         if len(self._truths) > REMEMBERED:
             del self._truths[next(iter(self._truths))]
         if message.step in self._drawn_steps:
-            self._points.append((Moment(message.step, arrival_ns), message.x))
+            self._note_truth(Moment(message.step, arrival_ns), message.x)
 
     def flush(self) -> None:
         """Make and send the bodies of the steps whose sets are all there or have waited long enough."""
@@ -138,7 +150,7 @@ class Space:
         if step not in self._drawn_steps:
             self._drawn_steps[step] = None
             if step in self._truths:
-                self._points.append((sets[0].moment, self._truths[step]))
+                self._note_truth(sets[0].moment, self._truths[step])
             for peer in self._shown - {one.peer for one in sets}:  # whoever is silent must not show an old set
                 drawn[peer].append(_Drawn(sets[0].moment, EMPTY))
                 self._shown.discard(peer)
@@ -168,10 +180,12 @@ class Space:
         center, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         if one.peer in self._frames:
             self._frames[one.peer].look_at(one.moment, center, half)
-        self._half_widths[one.peer] = half
+        self._extents[one.peer] = lower, upper
         if one.peer in self._fusions or not self._fusions:
-            widths = np.array(list(self._half_widths.values()))
-            seen = np.minimum(widths.max(axis=0), frame.LARGEST_RATIO * widths.min(axis=0))
+            extents = np.array(list(self._extents.values()))
+            reach = np.maximum(extents[:, 1] - center, center - extents[:, 0]).max(axis=0)
+            widths = 0.5 * (extents[:, 1] - extents[:, 0])
+            seen = np.minimum(reach, frame.LARGEST_RATIO * widths.min(axis=0))
             self._frames[frame.ALL].look_at(one.moment, center, np.maximum(seen, half))
 
     def _body(self, one: _Set) -> Body:
@@ -190,28 +204,49 @@ class Space:
         lines = rr.LineStrips3D.columns(strips=strips).partition([len(one.body.edges) for one in drawn])
         self._stream.send_columns(path("space", "sets", peer, "edges"), times, lines)
 
+    def _note_truth(self, moment: Moment, x: list[float]) -> None:
+        """The true state, and how far its cross must go to be seen outside of the sets that hold it."""
+        place, reach = np.zeros(3), np.zeros(3)
+        place[: len(self._axes)] = np.array(x)[list(self._axes)]
+        if len(self._axes) == 2:
+            place[2] = IN_FRONT
+        scale = self._frames[frame.ALL].scale
+        if scale is not None and len(self._axes) == 3:
+            reach[:] = CROSS * scale
+        self._points.append(_Truth(moment, place, reach))
+
     def _send_points(self) -> None:
         points, self._points = self._points, []
         if not points:
             return
         heights = list(self._lanes.values()) if len(self._axes) == 1 else [0.0]
-        places = np.zeros((len(points), len(heights), 3))
-        places[:, :, : len(self._axes)] = np.array([x for _, x in points])[:, None, list(self._axes)]
-        if len(self._axes) == 1:
-            places[:, :, 1] = heights
-        times = self._timelines.columns([moment for moment, _ in points])
+        places = np.repeat(np.array([point.place for point in points])[:, None, :], len(heights), axis=1)
+        places[:, :, 1] += heights
+        times = self._timelines.columns([point.moment for point in points])
         columns = rr.Points3D.columns(positions=places.reshape(-1, 3)).partition([len(heights)] * len(points))
         self._stream.send_columns(path("space", "truth"), times, columns)
+        if len(self._axes) == 3:
+            arms = np.concatenate([_cross(point) for point in points])
+            lines = rr.LineStrips3D.columns(strips=arms).partition([3] * len(points))
+            self._stream.send_columns(path("space", "truth", "cross"), times, lines)
 
     def _style(self, colors: dict[str, Color]) -> None:
-        label = {"labels": ["truth"], "show_labels": True} if len(self._axes) > 1 else {}
-        truth = rr.Points3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(7.0), point_shading=FLAT, **label)
+        truth = rr.Points3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(6.0), point_shading=FLAT)
         self._stream.log(path("space", "truth"), truth, static=True)
+        cross = rr.LineStrips3D.from_fields(colors=[TRUTH], radii=rr.Radius.ui_points(0.6))
+        self._stream.log(path("space", "truth", "cross"), cross, static=True)
         for peer, color in colors.items():
             mesh = rr.Mesh3D.from_fields(albedo_factor=(*color, 50 if peer in self._fusions else 25))
             self._stream.log(path("space", "sets", peer), mesh, static=True)
-            edges = rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(1.2))
+            width = 1.2 if peer in self._fusions or not self._fusions else 0.9
+            edges = rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(width))
             self._stream.log(path("space", "sets", peer, "edges"), edges, static=True)
+
+
+def _cross(point: _Truth) -> Array:
+    """Three lines through the truth, along the axes: (3, 2, 3)."""
+    arms = np.diag(point.reach)
+    return np.stack([point.place - arms, point.place + arms], axis=1)
 
 
 def _load_solvers() -> None:

@@ -131,6 +131,6 @@ def test_the_file_of_a_killed_recorder_opens(tmp_path: Path) -> None:
     path, _, _ = killed_recording(tmp_path, 8)
     with HeadlessViewer() as viewer:
         viewer.open(path)
-        viewer.picture(tmp_path / "killed.png")
+        viewer.picture(tmp_path / "killed.png", settled=False)
         assert viewer.complaints() == []
         assert viewer.last_step() > 20

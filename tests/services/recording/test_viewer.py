@@ -101,7 +101,7 @@ def pictures(viewer: HeadlessViewer, tabs: list[str], folder: Path) -> dict[str,
     taken = {tab: folder / f"{tab}.png" for tab in tabs}
     for tab, picture in taken.items():
         viewer.show(tab)
-        viewer.picture(picture)
+        viewer.picture(picture, settled=False)
     return taken
 
 
@@ -125,7 +125,7 @@ def test_a_viewer_that_follows_and_freezes_disturbs_nothing(viewer: HeadlessView
     go_on(range(1, 60))
     viewer.follow(f"rerun+http://127.0.0.1:{port}/proxy")
     go_on(range(60, 120))
-    viewer.picture(tmp_path / "live.png")
+    viewer.picture(tmp_path / "live.png", settled=False)
     assert viewer.last_step() > 60
     assert viewer.complaints() == []
     assert pixels(tmp_path / "live.png", colors(configuration)["main"], 0.4) > 1000
@@ -148,5 +148,5 @@ def test_the_viewer_does_complain_of_a_broken_recording(viewer: HeadlessViewer, 
     stream.log("mesh", rr.Mesh3D(vertex_positions=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], triangle_indices=[[0, 1, 99]]))
     stream.disconnect()
     viewer.open(tmp_path / "broken.rrd")
-    viewer.picture(tmp_path / "broken.png")
+    viewer.picture(tmp_path / "broken.png", settled=False)
     assert any("broken" in complaint or "mesh" in complaint for complaint in viewer.complaints())
