@@ -253,7 +253,7 @@ def _space(names: Names, name: str, sets: list[str]) -> Part:
         position, target = (0.0, height, max(2.8, 2.5 * height)), (0.0, height, 0.0)
         eye = rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 1.0, 0.0))
     else:
-        eye = rrb.EyeControls3D(position=(1.25, -2.2, 1.1), look_target=(0.0, 0.0, -0.1), eye_up=(0.0, 0.0, 1.0))
+        eye = rrb.EyeControls3D(position=(1.4, -2.45, 1.25), look_target=(0.0, 0.0, -0.1), eye_up=(0.0, 0.0, 1.0))
     contents = [*sets, "/space/truth/**", f"{origin}/**"]
     return rrb.Spatial3DView(
         name=title, origin=origin, contents=contents, eye_controls=eye, line_grid=rrb.LineGrid3D(visible=False)

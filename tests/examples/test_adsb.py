@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-import subprocess
 from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+from flights import convert_module, flight
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -31,23 +30,7 @@ PIECES = 8
 
 @pytest.fixture(scope="module")
 def convert(root: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("convert", root / "examples" / "adsb" / "convert.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def flight(root: Path, folder: Path, convert: ModuleType, name: str) -> Configuration:
-    """The example's configuration with a flight that is fetched."""
-    try:
-        start, _, _ = convert.convert(name, folder / f"{name}.csv")
-    except subprocess.CalledProcessError:
-        pytest.skip(f"{convert.PACKAGE}, which carries the flights, cannot be fetched here")
-    file = folder / f"{name}.csv"
-    overrides = [f'sensors.baro.file="{file}"', f"mesh.start_time={start - 1.0}"]
-    return load(root / "examples" / "adsb" / "adsb.toml", overrides)
+    return convert_module(root)
 
 
 @pytest.fixture(scope="module")

@@ -6,17 +6,16 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 from headless_viewer import HeadlessViewer, free_port, why_not
-from PIL import Image
+from pixels import Area, pixels
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Event
 from services.recording.made_up_mesh import START_NS, STEP_NS, MadeUpMesh, written
-from services.recording.palette import TRUTH, Color, colors
+from services.recording.palette import TRUTH, colors
 from services.recording.read import read_raw
 from services.recording.recorder import Recorder
 
@@ -24,23 +23,15 @@ pytestmark = [
     pytest.mark.viewer,
     pytest.mark.skipif(why_not() is not None, reason=why_not() or ""),
 ]
-CLOSE = 9
-"""Largest difference of hue, of 256, between a colour and what the viewer makes of it."""
+
+LEFT, RIGHT = Area(right=0.4), Area(left=0.4)
+"""Sets, and plots."""
 
 
 @pytest.fixture(scope="module")
 def viewer() -> Iterator[HeadlessViewer]:
     with HeadlessViewer() as started:
         yield started
-
-
-def pixels(picture: Path, color: Color, left: float = 0.0, right: float = 1.0) -> int:
-    """Pixels of a colour's hue between two shares of the picture's width; shades and veils keep the hue."""
-    image = np.asarray(Image.open(picture).convert("HSV")).astype(np.int16)
-    part = image[80:-80, int(left * image.shape[1]) : int(right * image.shape[1])]
-    hue = int(np.asarray(Image.new("RGB", (1, 1), color).convert("HSV"))[0, 0, 0])
-    apart = np.abs((part[:, :, 0] - hue + 128) % 256 - 128)
-    return int(((apart <= CLOSE) & (part[:, :, 1] > 110) & (part[:, :, 2] > 90)).sum())
 
 
 def recorded(configuration: Configuration, path: Path, steps: int = 160) -> Path:
@@ -69,14 +60,14 @@ def test_every_tab_of_three_states_is_drawn_without_a_complaint(viewer: Headless
     assert viewer.complaints() == []
     chosen = colors(configuration)
     for name, tab in zip(("f1", "f2", "f3"), filters, strict=True):
-        assert pixels(seen["Overview"], chosen[name], 0.0, 0.4) > 300, "the set of every filter has edges"
-        assert pixels(seen["Overview"], chosen[name], 0.4) > 300, "the bounds of every filter are lines"
-        assert pixels(seen[tab], chosen[name], 0.0, 0.4) > 1000, "the filter's own tab shows its set"
-        assert pixels(seen[tab], chosen[name], 0.4) > 5000, "the filter's own tab shows its bands"
+        assert pixels(seen["Overview"], chosen[name], LEFT) > 300, "the set of every filter has edges"
+        assert pixels(seen["Overview"], chosen[name], RIGHT) > 300, "the bounds of every filter are lines"
+        assert pixels(seen[tab], chosen[name], LEFT) > 1000, "the filter's own tab shows its set"
+        assert pixels(seen[tab], chosen[name], RIGHT) > 5000, "the filter's own tab shows its bands"
         assert pixels(seen["Outputs"], chosen[name]) > 300, "the predicted outputs are there"
-    assert pixels(seen["Overview"], chosen["main"], 0.0, 0.4) > 1000, "the fused set is among them"
-    assert pixels(seen["Fusion"], chosen["main"], 0.4) > 5000, "the fused bands are there"
-    assert pixels(seen["Mesh"], (0, 160, 80), 0.5) > 10000, "the lanes are green"
+    assert pixels(seen["Overview"], chosen["main"], LEFT) > 1000, "the fused set is among them"
+    assert pixels(seen["Fusion"], chosen["main"], RIGHT) > 5000, "the fused bands are there"
+    assert pixels(seen["Mesh"], (0, 160, 80), Area(0.5)) > 10000, "the lanes are green"
     assert pixels(seen["Events"], (255, 130, 0)) > 20, "a warning is orange"
 
 
@@ -90,10 +81,10 @@ def test_other_sizes_are_drawn_without_a_complaint(
     seen = pictures(viewer, ["Overview", "f1 (LSUO)"], tmp_path)
     assert viewer.complaints() == []
     chosen = colors(configuration)
-    assert pixels(seen["Overview"], TRUTH, 0.4) > 300, "the truth is a line in the plots"
-    assert pixels(seen["Overview"], chosen["main"], 0.4) > 3000, "the fused bands are there"
-    assert pixels(seen["Overview"], chosen["main"], 0.0, 0.4) > 100, "the fused set is there"
-    assert pixels(seen["f1 (LSUO)"], chosen["f1"], 0.0, 0.4) > 1000, "the filter's set is there"
+    assert pixels(seen["Overview"], TRUTH, RIGHT) > 300, "the truth is a line in the plots"
+    assert pixels(seen["Overview"], chosen["main"], RIGHT) > 3000, "the fused bands are there"
+    assert pixels(seen["Overview"], chosen["main"], LEFT) > 100, "the fused set is there"
+    assert pixels(seen["f1 (LSUO)"], chosen["f1"], LEFT) > 1000, "the filter's set is there"
 
 
 def pictures(viewer: HeadlessViewer, tabs: list[str], folder: Path) -> dict[str, Path]:
@@ -128,7 +119,7 @@ def test_a_viewer_that_follows_and_freezes_disturbs_nothing(viewer: HeadlessView
     viewer.picture(tmp_path / "live.png", settled=False)
     assert viewer.last_step() > 60
     assert viewer.complaints() == []
-    assert pixels(tmp_path / "live.png", colors(configuration)["main"], 0.4) > 1000
+    assert pixels(tmp_path / "live.png", colors(configuration)["main"], RIGHT) > 1000
     with viewer.frozen():
         assert go_on(range(120, 320)) < 1.0
     recorder.close()
