@@ -6,10 +6,12 @@ import argparse
 import json
 import math
 import os
+import signal
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from types import FrameType
 
 from lsu_mesh.mesh.config import ConfigurationError, load
 from lsu_mesh.mesh.simulator.campaign import Tally, run_seeds
@@ -41,6 +43,7 @@ def main(options: argparse.Namespace) -> int:
     seeds = range(options.first, options.first + options.seeds) if one is None else range(one, one + 1)
     tally, began = Tally(), time.monotonic()
     end = math.inf if options.minutes is None else began + 60.0 * options.minutes
+    before = signal.signal(signal.SIGTERM, _interrupt)
     try:
         for outcome in run_seeds(path, seeds, options.steps, faults, options.workers or os.cpu_count() or 1):
             tally.add(outcome)
@@ -49,8 +52,15 @@ def main(options: argparse.Namespace) -> int:
                 break
     except KeyboardInterrupt:
         print("stopped; the seeds so far:", file=sys.stderr)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     _sum_up(tally, seeds, time.monotonic() - began, options)
     return NOT_MET if tally.broken else OK
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Asked to end, as by Ctrl-C: what was found so far is told."""
+    raise KeyboardInterrupt
 
 
 def _tell(outcome: Outcome, options: argparse.Namespace) -> None:
