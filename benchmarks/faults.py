@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
@@ -26,6 +28,9 @@ PEERS_FAULTS = (live_faults.kill, live_faults.restart, live_faults.freeze)
 STAR_FAULTS = (live_faults.delay, live_faults.stall, live_faults.cut, live_faults.corrupt)
 RESUME_S, RESUME_AFTER_FREEZE_S = 1.0, 2.0 + live_faults.LEASE_S
 STOP_S, STOP_WITHOUT_ROUTER_S = 3.0, 15.0
+IDENTIFIER = 'identifier.bounds.sensors=["s1","s2","s3"]'
+Endings: TypeAlias = "tuple[str, float, Sequence[Ending]]"
+"""The signal in words, the limit in seconds, and how each peer ended."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rate", type=float, default=50.0, help="steps per second (default: 50)")
     parser.add_argument("--soak", type=float, metavar="MINUTES", help="run for so long and watch the memory")
+    parser.add_argument("--only", metavar="WORDS", help="only faults or roles with these words, and no endings")
     parser.add_argument("--strict", action="store_true", help="limits on time count as promises (an idle machine)")
     options = parser.parse_args(arguments)
     overrides = [f"mesh.rate={options.rate}"]
@@ -41,23 +47,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
             report = soak(Path(folder), overrides, options.soak * 60)
             print(report.table())
             return report.is_broken()
-        return _all_faults(Path(folder), overrides, options.strict)
+        return _all_faults(Path(folder), overrides, options.strict, options.only or "")
 
 
-def _all_faults(folder: Path, overrides: Sequence[str], strict: bool) -> int:
+def _all_faults(folder: Path, overrides: Sequence[str], strict: bool, only: str) -> int:
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} at the start\n\n{HEADER}", flush=True)
     outcomes, endings = [], []
     with LiveMesh(_new(folder / "peers"), overrides) as mesh:
         mesh.until(lambda: mesh.is_current(0), "estimates flow")
-        outcomes += _each_role(mesh, PEERS_FAULTS)
-        outcomes.append(_told(live_faults.slow_subscriber(mesh)))
-        endings.append(("SIGINT or SIGTERM", STOP_S, live_faults.stop_all(mesh, 60.0)))
-    with LiveMesh(_new(folder / "star"), overrides, star=True) as mesh:
-        mesh.until(lambda: mesh.is_current(0), "estimates flow")
-        outcomes += _each_role(mesh, STAR_FAULTS)
-        live_faults.lose_router(mesh)
-        endings.append(("the same, router lost", STOP_WITHOUT_ROUTER_S, live_faults.stop_all(mesh, 60.0)))
-    print(f"\n{_ending_table(endings)}\n\nload {os.getloadavg()[0]:.1f} at the end")
+        outcomes += _each_role(mesh, PEERS_FAULTS, only)
+        if only in "subscriber":
+            outcomes.append(_told(live_faults.slow_subscriber(mesh)))
+    if not only or only in "router link bit":
+        with LiveMesh(_new(folder / "star"), overrides, star=True) as mesh:
+            mesh.until(lambda: mesh.is_current(0), "estimates flow")
+            outcomes += _each_role(mesh, STAR_FAULTS, only)
+            for number in (signal.SIGKILL, *live_faults.BOTH):
+                outcome, ending = live_faults.router_outage(mesh, number)
+                outcomes.append(_told(outcome))
+                endings += [(number.name, STOP_S, [ending])] if number != signal.SIGKILL else []
+    if not only:
+        endings += _endings(folder, overrides)
+        print(f"\n{_ending_table(endings)}")
+    print(f"\nload {os.getloadavg()[0]:.1f} at the end")
     broken = [outcome for outcome in outcomes if outcome.inside < outcome.estimates or outcome.lost]
     ill = [ending for _, _, group in endings for ending in group if ending.code != 0]
     slow: list[Outcome | Ending] = [outcome for outcome in outcomes if _is_slow(outcome)]
@@ -68,8 +80,24 @@ def _all_faults(folder: Path, overrides: Sequence[str], strict: bool) -> int:
     return int(bool(broken or ill or (strict and slow)))
 
 
-def _each_role(mesh: LiveMesh, faults: Sequence[Callable[[LiveMesh, str], Outcome]]) -> list[Outcome]:
-    return [_told(fault(mesh, role)) for fault in faults for role in ROLES]
+def _endings(folder: Path, overrides: Sequence[str]) -> list[Endings]:
+    """Every role is asked to end by each signal, in meshes of their own, with its router and without."""
+    found: list[Endings] = []
+    for number in live_faults.BOTH:
+        for star in (False, True):
+            with LiveMesh(_new(folder / f"{number.name}-{star}"), [*overrides, IDENTIFIER], star=star) as mesh:
+                mesh.until(lambda mesh=mesh: mesh.is_current(0), "estimates flow")
+                if star:
+                    live_faults.lose_router(mesh)
+                words = f"{number.name}, router lost" if star else number.name
+                limit = STOP_WITHOUT_ROUTER_S if star else STOP_S
+                found.append((words, limit, live_faults.stop_all(mesh, 60.0, [number])))
+    return found
+
+
+def _each_role(mesh: LiveMesh, faults: Sequence[Callable[[LiveMesh, str], Outcome]], only: str) -> list[Outcome]:
+    chosen = [(fault, role) for fault in faults for role in ROLES if only in f"{fault.__name__} {role}"]
+    return [_told(fault(mesh, role)) for fault, role in chosen]
 
 
 def _told(outcome: Outcome) -> Outcome:
@@ -84,10 +112,10 @@ def _is_slow(outcome: Outcome) -> bool:
     return outcome.fault.startswith("SIGSTOP") and outcome.resumed > RESUME_AFTER_FREEZE_S
 
 
-def _ending_table(endings: Sequence[tuple[str, float, Sequence[Ending]]]) -> str:
+def _ending_table(endings: Sequence[Endings]) -> str:
     lines = ["| asked to stop by | role | exit codes | slowest | limit |", "|---|---|---|---|---|"]
     for words, limit, group in endings:
-        for role in ROLES:
+        for role in dict.fromkeys(ending.role for ending in group):
             own = [ending for ending in group if ending.role == role]
             codes = sorted({str(ending.code) for ending in own})
             slowest = max(ending.seconds for ending in own)

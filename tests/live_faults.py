@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,6 +17,7 @@ from lsu_mesh.mesh.keys import PREFIX
 
 ROLES = {"plant": "plant", "sensor": "s2", "filter": "cz", "fusion": "main", "recorder": "recorder"}
 """One peer of each role of the demo."""
+BOTH = (signal.SIGTERM, signal.SIGINT)
 LEASE_S = 2.0
 SETTLE_S = 15.0
 """Recovery of missed messages may take so long on a loaded machine."""
@@ -259,12 +260,12 @@ class Ending:
     seconds: float
 
 
-def stop_all(mesh: LiveMesh, patience: float) -> list[Ending]:
-    """SIGINT to every second peer, SIGTERM to the others, all at once."""
+def stop_all(mesh: LiveMesh, patience: float, numbers: Sequence[signal.Signals] = BOTH) -> list[Ending]:
+    """All are asked at once, each by the next of these signals."""
     asked = time.monotonic()
     children = [mesh.child(name) for _, name in mesh.peers]
-    numbers = [signal.SIGINT if i % 2 else signal.SIGTERM for i in range(len(children))]
-    for child, number in zip(children, numbers, strict=True):
+    sent = [numbers[i % len(numbers)] for i in range(len(children))]
+    for child, number in zip(children, sent, strict=True):
         mesh.process(child.name).send_signal(number)
     endings = []
     left = dict(enumerate(children))
@@ -272,9 +273,43 @@ def stop_all(mesh: LiveMesh, patience: float) -> list[Ending]:
         for i, child in list(left.items()):
             if child.process is not None and (code := child.process.poll()) is not None:
                 del left[i]
-                endings.append(Ending(child.role, child.name, numbers[i].name, code, time.monotonic() - asked))
+                endings.append(Ending(child.role, child.name, sent[i].name, code, time.monotonic() - asked))
         time.sleep(0.005)
-    return endings + [Ending(c.role, c.name, numbers[i].name, None, patience) for i, c in left.items()]
+    return endings + [Ending(c.role, c.name, sent[i].name, None, patience) for i, c in left.items()]
+
+
+def router_outage(mesh: LiveMesh, number: signal.Signals) -> tuple[Outcome, Ending]:
+    """The router that all peers are clients of ends, and starts again; how it ended too."""
+    begin = mesh.clock.now()
+    mesh.until(lambda: mesh.is_current(begin), "all is well before the fault")
+    broken = mesh.clock.now()
+    process = mesh.child("router").process
+    assert process is not None
+    process.send_signal(number)
+    ending = Ending("router", "router", number.name, process.wait(timeout=60), (mesh.clock.now() - broken) * 1e-9)
+    time.sleep(1.0)  # how long the outage lasts
+    mesh.supervisor.watch(time.monotonic())
+    repaired = mesh.clock.now()
+    mesh.supervisor.watch(time.monotonic())
+    names = {name for _, name in mesh.peers}
+
+    def returned() -> int | None:
+        return next((at for at, _, there in mesh.observer.tokens if there and at > repaired), None)
+
+    mesh.until(lambda: returned() is not None, "the first peer is back")
+    back = returned()
+    assert back is not None
+    mesh.until(lambda: mesh.is_current(back) and names <= mesh.observer.alive, "recovered from the router's outage")
+    recovered = mesh.clock.now()
+    resumed = max(_first_current(mesh, estimator, back) for estimator in mesh.estimators())
+    lost = _lost(mesh, recovered)
+    inside, count = mesh.containment(broken)
+    gone = [at for at, _, there in mesh.observer.tokens if not there and at > broken]
+    words = "kill -9" if number == signal.SIGKILL else f"{number.name}, started again"
+    return Outcome(
+        words, "router", (gone[0] - broken) * 1e-9 if gone else None, "token", (back - repaired) * 1e-9,
+        (resumed - back) * 1e-9, (recovered - back) * 1e-9, lost, count, inside,
+    ), ending  # fmt: skip
 
 
 def lose_router(mesh: LiveMesh) -> None:

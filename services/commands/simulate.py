@@ -14,11 +14,12 @@ from pathlib import Path
 from types import FrameType
 
 from lsu_mesh.mesh.config import ConfigurationError, load
-from lsu_mesh.mesh.simulator.campaign import Tally, run_seeds
+from lsu_mesh.mesh.simulator.campaign import CHUNK, Tally, run_seeds
 from lsu_mesh.mesh.simulator.faults import parse_faults
 from lsu_mesh.mesh.simulator.run import Outcome
 from services.cli import NOT_MET, OK, USAGE
 from services.commands.configuration import DEMO, print_problems
+from services.stop import Stop
 
 
 def main(options: argparse.Namespace) -> int:
@@ -43,24 +44,34 @@ def main(options: argparse.Namespace) -> int:
     seeds = range(options.first, options.first + options.seeds) if one is None else range(one, one + 1)
     tally, began = Tally(), time.monotonic()
     end = math.inf if options.minutes is None else began + 60.0 * options.minutes
-    before = signal.signal(signal.SIGTERM, _interrupt)
+    workers = options.workers or os.cpu_count() or 1
+    stop = Stop()
+    if workers > 1 and len(seeds) > CHUNK:
+        _interrupt_while_waiting(stop)
     try:
-        for outcome in run_seeds(path, seeds, options.steps, faults, options.workers or os.cpu_count() or 1):
+        for outcome in run_seeds(path, seeds, options.steps, faults, workers):
             tally.add(outcome)
             _tell(outcome, options)
-            if time.monotonic() > end:
+            if stop or time.monotonic() > end:
                 break
     except KeyboardInterrupt:
+        stop.is_set = True
+    if stop:
         print("stopped; the seeds so far:", file=sys.stderr)
-    finally:
-        signal.signal(signal.SIGTERM, before)
     _sum_up(tally, seeds, time.monotonic() - began, options)
     return NOT_MET if tally.broken else OK
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Asked to end, as by Ctrl-C: what was found so far is told."""
-    raise KeyboardInterrupt
+def _interrupt_while_waiting(stop: Stop) -> None:
+    """End the wait for other processes at once; where seeds run in this one, compiled code must not be torn open."""
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if not stop.is_set:
+            raise KeyboardInterrupt
+        os._exit(130)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handle)
 
 
 def _tell(outcome: Outcome, options: argparse.Namespace) -> None:

@@ -12,8 +12,15 @@ import psutil
 import pytest
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize(
+    ("number", "workers"),
+    [
+        (signal.SIGTERM, "2"),
+        (signal.SIGINT, "1"),
+        pytest.param(signal.SIGTERM, "1", marks=pytest.mark.soak),
+        pytest.param(signal.SIGINT, "2", marks=pytest.mark.soak),
+    ],
+)
 def test_one_that_is_asked_to_end_sums_up_the_seeds_so_far(
     lsu_mesh_command: list[str], root: Path, number: int, workers: str
 ) -> None:
