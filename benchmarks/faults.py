@@ -28,6 +28,11 @@ PEERS_FAULTS = (live_faults.kill, live_faults.restart, live_faults.freeze)
 STAR_FAULTS = (live_faults.delay, live_faults.stall, live_faults.cut, live_faults.corrupt)
 RESUME_S, RESUME_AFTER_FREEZE_S = 1.0, 2.0 + live_faults.LEASE_S
 STOP_S, STOP_WITHOUT_ROUTER_S = 3.0, 15.0
+ROUTER_FAULTS: dict[Callable[[LiveMesh], None] | None, str] = {
+    None: "",
+    live_faults.lose_router: ", router lost",
+    live_faults.freeze_router: ", router frozen",
+}
 IDENTIFIER = 'identifier.bounds.sensors=["s1","s2","s3"]'
 Endings: TypeAlias = "tuple[str, float, Sequence[Ending]]"
 """The signal in words, the limit in seconds, and how each peer ended."""
@@ -53,11 +58,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _all_faults(folder: Path, overrides: Sequence[str], strict: bool, only: str) -> int:
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} at the start\n\n{HEADER}", flush=True)
     outcomes, endings = [], []
-    with LiveMesh(_new(folder / "peers"), overrides) as mesh:
-        mesh.until(lambda: mesh.is_current(0), "estimates flow")
-        outcomes += _each_role(mesh, PEERS_FAULTS, only)
-        if only in "subscriber":
-            outcomes.append(_told(live_faults.slow_subscriber(mesh)))
+    if only != "endings":
+        with LiveMesh(_new(folder / "peers"), overrides) as mesh:
+            mesh.until(lambda: mesh.is_current(0), "estimates flow")
+            outcomes += _each_role(mesh, PEERS_FAULTS, only)
+            if only in "subscriber":
+                outcomes.append(_told(live_faults.slow_subscriber(mesh)))
     if not only or only in "router link bit":
         with LiveMesh(_new(folder / "star"), overrides, star=True) as mesh:
             mesh.until(lambda: mesh.is_current(0), "estimates flow")
@@ -66,7 +72,7 @@ def _all_faults(folder: Path, overrides: Sequence[str], strict: bool, only: str)
                 outcome, ending = live_faults.router_outage(mesh, number)
                 outcomes.append(_told(outcome))
                 endings += [(number.name, STOP_S, [ending])] if number != signal.SIGKILL else []
-    if not only:
+    if only in "endings":
         endings += _endings(folder, overrides)
         print(f"\n{_ending_table(endings)}")
     print(f"\nload {os.getloadavg()[0]:.1f} at the end")
@@ -81,17 +87,17 @@ def _all_faults(folder: Path, overrides: Sequence[str], strict: bool, only: str)
 
 
 def _endings(folder: Path, overrides: Sequence[str]) -> list[Endings]:
-    """Every role is asked to end by each signal, in meshes of their own, with its router and without."""
+    """Every role is asked to end by each signal, in a mesh of peers and in stars whose router is gone or silent."""
     found: list[Endings] = []
     for number in live_faults.BOTH:
-        for star in (False, True):
-            with LiveMesh(_new(folder / f"{number.name}-{star}"), [*overrides, IDENTIFIER], star=star) as mesh:
+        for fault, words in ROUTER_FAULTS.items():
+            folder_of_one = _new(folder / f"{number.name}{len(found)}")
+            with LiveMesh(folder_of_one, [*overrides, IDENTIFIER], star=fault is not None) as mesh:
                 mesh.until(lambda mesh=mesh: mesh.is_current(0), "estimates flow")
-                if star:
-                    live_faults.lose_router(mesh)
-                words = f"{number.name}, router lost" if star else number.name
-                limit = STOP_WITHOUT_ROUTER_S if star else STOP_S
-                found.append((words, limit, live_faults.stop_all(mesh, 60.0, [number])))
+                if fault is not None:
+                    fault(mesh)
+                limit = STOP_S if fault is None else STOP_WITHOUT_ROUTER_S
+                found.append((f"{number.name}{words}", limit, live_faults.stop_all(mesh, 60.0, [number])))
     return found
 
 

@@ -318,3 +318,8 @@ def lose_router(mesh: LiveMesh) -> None:
     mesh.process("router").kill()
     assert router.process is not None
     router.process.wait()
+
+
+def freeze_router(mesh: LiveMesh) -> None:
+    """Its links stay open and carry nothing, for good."""
+    mesh.process("router").send_signal(signal.SIGSTOP)
