@@ -303,12 +303,16 @@ def test_a_million_hostile_messages_per_node(number: int) -> None:
     node.rehearse()
     assault(configuration, node, 0, 2_000)
     process = psutil.Process()
-    before, slow = process.memory_info().rss, 0
+    before, slowest = process.memory_info().rss, []
     for seed in range(1, 101):
-        slow += sum(took >= LONGEST_NS for took in assault(configuration, node, seed, 10_000))
+        slowest.append(max(assault(configuration, node, seed, 10_000)))
     grown = process.memory_info().rss - before
-    print(f"{node.role} {node.name}: 1,000,000 messages, {slow} over 10 ms, memory grew by {grown / 2**20:.0f} MiB")
-    assert slow == 0
+    print(
+        f"{node.role} {node.name}: 1,000,000 messages, slowest {max(slowest) * 1e-6:.2f} ms of processor time, "
+        f"memory grew by {grown / 2**20:.1f} MiB",
+        flush=True,
+    )
+    assert max(slowest) < LONGEST_NS
     assert grown < 100 * 2**20
 
 
@@ -318,9 +322,19 @@ def test_a_million_hostile_messages_per_node(number: int) -> None:
 def test_a_million_broken_payloads_per_decoder(topic: str) -> None:
     rng = np.random.default_rng(0)
     valid = encode(example(topic))
+    process = psutil.Process()
+    before, slowest, sound = process.memory_info().rss, 0, 0
     for _ in range(1_000_000):
         payload = bytearray(valid)
         payload[int(rng.integers(len(payload)))] = int(rng.integers(256))
-        decoded_in_time(
-            topic, bytes(payload[: int(rng.integers(len(payload) + 1))]) if rng.random() < 0.3 else bytes(payload)
-        )
+        broken = bytes(payload[: int(rng.integers(len(payload) + 1))] if rng.random() < 0.3 else payload)
+        began = time.thread_time_ns()
+        sound += decoded_in_time(topic, broken) is not None
+        slowest = max(slowest, time.thread_time_ns() - began)
+    grown = process.memory_info().rss - before
+    print(
+        f"decoder of {topic}: 1,000,000 payloads, {sound} of them sound, slowest {slowest * 1e-6:.2f} ms of "
+        f"processor time, memory grew by {grown / 2**20:.1f} MiB",
+        flush=True,
+    )
+    assert grown < 100 * 2**20
