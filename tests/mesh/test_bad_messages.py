@@ -303,9 +303,8 @@ def test_a_million_hostile_messages_per_node(number: int) -> None:
     node.rehearse()
     assault(configuration, node, 0, 2_000)
     process = psutil.Process()
-    before, slowest = process.memory_info().rss, []
-    for seed in range(1, 101):
-        slowest.append(max(assault(configuration, node, seed, 10_000)))
+    before = process.memory_info().rss
+    slowest = [max(assault(configuration, node, seed, 10_000)) for seed in range(1, 101)]
     grown = process.memory_info().rss - before
     print(
         f"{node.role} {node.name}: 1,000,000 messages, slowest {max(slowest) * 1e-6:.2f} ms of processor time, "
