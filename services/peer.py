@@ -17,8 +17,6 @@ from services.recovery import Recovery
 from services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
-MOST_AT_ONCE = 2048
-"""Messages taken before the node does its steps, however many more are waiting."""
 LONGEST_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
@@ -102,11 +100,11 @@ class Peer:
         arrival = self._bus.next(self._patience())
         began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
         age_ns = 0 if arrival is None else began - arrival.arrival_ns
-        for taken in range(1, MOST_AT_ONCE + 1):
+        for taken in range(1, self._node.takes_at_once + 1):
             if arrival is None:
                 break
             self._publish(self._take(arrival))
-            arrival = self._bus.next(0) if taken < MOST_AT_ONCE else None
+            arrival = self._bus.next(0) if taken < self._node.takes_at_once else None
         self._publish(self._node.tick(self._clock.now()))
         self._measure(queued, age_ns, self._clock.now() - began)
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from lsu_mesh.mesh.messages import Fused, Health, Input, Measurement, Message, Posterior, decode, encode
-from lsu_mesh.mesh.nodes import estimator
+from lsu_mesh.mesh.messages import Event, Fused, Health, Input, Measurement, Message, Posterior, decode, encode
+from lsu_mesh.mesh.nodes import estimator, fusion
 
 STEPS = 1800
 """Three references a step: more than one message may list."""
@@ -87,6 +87,7 @@ def test_one_that_gets_more_than_a_tick_does_stays_bounded_says_so_and_catches_u
     heard: Any, monkeypatch: pytest.MonkeyPatch, role: str, name: str
 ) -> None:
     monkeypatch.setattr(estimator, "MOST_AT_ONCE", AT_ONCE)
+    monkeypatch.setattr(fusion, "FAR_BEHIND", 10**6)
     node = heard.start(role, name)
     kinds = Input | Measurement if role == "filter" else Input | Posterior
     data = [(address, m) for address, m in heard.sent if isinstance(m, kinds) and m.name != name]
@@ -112,3 +113,43 @@ def test_one_that_gets_more_than_a_tick_does_stays_bounded_says_so_and_catches_u
         assert all(
             low <= x <= high for low, x, high in zip(message.lower, truth[message.step], message.upper, strict=True)
         )
+
+
+def test_a_fusion_that_is_too_far_behind_goes_on_where_its_sources_are_and_says_so(heard: Any) -> None:
+    node = heard.start("fusion", "main")
+    data = [(address, m) for address, m in heard.sent if isinstance(m, Input | Posterior) and m.name != "main"]
+
+    def hear(first: int, last: int) -> None:
+        for address, message in data:
+            if first <= message.step <= last:
+                node.deliver(address, encode(message), heard.now)
+
+    hear(1, 20)
+    node.tick(heard.now)
+    hear(21, 1500)
+    told = [*node.tick(heard.now + 1), *ticked(node, 1500, heard.now + 2)]
+    assert node.counters()["skipped"] == 1500 - node.history - 21
+    (event,) = [m for m in told if isinstance(m, Event)]
+    assert (event.level, event.code) == ("WARN", "skipped-ahead")
+    assert "1463 steps from step 21 on are skipped" in event.text
+    fused = [m for m in told if isinstance(m, Fused)]
+    assert (fused[0].base, fused[0].status, fused[0].step) == ("sources", "restarted", 1500)
+    assert {src for _, src, _, _ in fused[0].used} == {"filter/box", "filter/para"}
+    hear(1501, 1510)
+    told = node.tick(heard.now + 10**9)
+    fused += [m for m in told if isinstance(m, Fused)]
+    assert [m.step for m in fused] == list(range(1500, 1511))
+    truth = heard.truth()
+    for m in fused:
+        assert all(low <= x <= high for low, x, high in zip(m.lower, truth[m.step], m.upper, strict=True))
+
+
+def test_a_fusion_that_is_far_behind_without_its_sources_keeps_what_it_has(heard: Any) -> None:
+    node = heard.start("fusion", "main")
+    for address, message in heard.sent:
+        if isinstance(message, Input) or (isinstance(message, Posterior) and message.step <= 20):
+            node.deliver(address, encode(message), heard.now)
+    ticked(node, 2000, heard.now + 10**9)
+    assert node.counters()["skipped"] == 0
+    assert node.last_posterior is not None
+    assert node.last_posterior.step >= 1999

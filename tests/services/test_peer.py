@@ -12,7 +12,6 @@ from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import VERSION, Health, Input, encode, encoding
 from lsu_mesh.mesh.nodes.filter import FilterNode
-from services import peer as peer_module
 from services.bus import Bus, Clock, SessionSettings
 from services.peer import Peer
 
@@ -24,7 +23,7 @@ FLOOD = 3 * MOST_AT_ONCE
 def test_a_flood_does_not_keep_a_peer_from_its_steps_and_it_says_how_long_messages_wait(
     demo: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(peer_module, "MOST_AT_ONCE", MOST_AT_ONCE)
+    monkeypatch.setattr(FilterNode, "takes_at_once", MOST_AT_ONCE)
     configuration = load(demo, ["mesh.steps=100000"])
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     clock = Clock()

@@ -15,7 +15,7 @@ from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
 from lsu_mesh.mesh.nodes.described import described_box
-from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator
+from lsu_mesh.mesh.nodes.estimator import START_GRACE, WEAKNESS, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint
 from lsu_mesh.mesh.nodes.quarantine import Quarantine, Say
 from lsu_mesh.mesh.nodes.step import Combined, Status, Step
@@ -25,6 +25,8 @@ from lsu_mesh.supports.support import Support, Vector
 
 MOST_FAMILIES = 64
 """So many families of contradicting sources are tried, the largest first, to find out whom to leave out."""
+FAR_BEHIND_S, FAR_BEHIND = 2.0, 256
+"""So far behind, in time at the mesh's rate and in steps, and a fusion goes on where its sources are."""
 SILENT_STEPS = 5
 """After so many steps without any message, a second at least, the fusion goes on by the clock."""
 
@@ -58,6 +60,8 @@ class FusionNode(Estimator):
 
     role = "fusion"
     publishes = PUBLISHES["fusion"]
+    takes_at_once = 16384
+    """Many: it can only know from the newest how far it is behind."""
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         self.settings = configuration.fusion[name]
@@ -74,7 +78,8 @@ class FusionNode(Estimator):
         self._quarantine = Quarantine(self.sources, self.settings.quarantine_after, self.settings.max_lag)
         self._told: set[tuple[int, str]] = set()
         """Steps and sources whose contradiction was told; a step that is done again does not tell it again."""
-        self._counts["silent steps"] = 0
+        self._counts |= {"silent steps": 0, "skipped": 0}
+        self._far_behind = max(FAR_BEHIND, int(FAR_BEHIND_S * configuration.mesh.rate))
         self.last: dict[str, Posterior] = {}
         """Last sound posterior of each source, for those that ask for it."""
 
@@ -113,7 +118,23 @@ class FusionNode(Estimator):
 
     def advance(self, now: int) -> list[Message]:
         self._sense_silence(now)
-        return super().advance(now)
+        return [*self._skip_ahead(now), *super().advance(now)]
+
+    def _skip_ahead(self, now: int) -> list[Message]:
+        """Far behind, join the sources where they are, like a fusion that starts late; what they know is enough."""
+        if self.current is None or self._signs.newest - self.current <= self._far_behind:
+            return []
+        first = self._signs.newest - self.history
+        if not any(self._is_start(k) for k in self._steps if k >= first):
+            return []
+        skipped, k = first - self.current, self.current
+        for old in [j for j in self._steps if j < first]:
+            del self._steps[old]
+        self.current, self._dirty, self._candidate, self._first_evidence = None, None, None, now - START_GRACE
+        self.reach.lose()
+        self._counts["skipped"] += skipped
+        text = f"too far behind: {skipped} steps from step {k} on are skipped; going on from what the sources say"
+        return [self.event("WARN", "skipped-ahead", text, now, k, {"step": k, "skipped": skipped})]
 
     def _sense_silence(self, now: int) -> None:
         """When nothing at all has come for a while, steps go on by the clock; the set then grows, honestly."""
@@ -245,13 +266,17 @@ class FusionNode(Estimator):
 
     def _start_from_candidate(self) -> bool:
         """A fusion that starts late takes what its sources say together of a step, once enough of them are there."""
-        enough = self.settings.faults + 1 if self.settings.policy == "relaxed" else 1
         for k in sorted(self._steps, reverse=True):
-            if len(self._sound_sources(self._steps[k])) >= enough and not self._input_missing(k):
+            if self._is_start(k):
                 self._begin(k, self.configuration.prior, "prior", restarted=True)
                 self.unsound = "started late"
                 return True
         return False
+
+    def _is_start(self, k: int) -> bool:
+        """Whether enough sources of step k are there to hold the state by themselves, and its input."""
+        enough = self.settings.faults + 1 if self.settings.policy == "relaxed" else 1
+        return len(self._sound_sources(self._steps[k])) >= enough and not self._input_missing(k)
 
     def _try_all(self, sources: Sequence[Source]) -> bool:
         return all(self._try(source) for source in sources)

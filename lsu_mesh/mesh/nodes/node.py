@@ -58,6 +58,8 @@ class Node(ABC):
     role: ClassVar[str]
     publishes: ClassVar[tuple[str, ...]] = ()
     """Topics that the node publishes, besides health and events."""
+    takes_at_once: ClassVar[int] = 2048
+    """Messages that the service around the node hands over before the next tick, however many more are waiting."""
     answers: ClassVar[tuple[str, ...]] = ()
     """Topics that come as answers to the node's queries, besides its subscriptions."""
 
