@@ -71,10 +71,15 @@ class HeadlessViewer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        assert self._process is not None
-        os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
+        self.kill()
         self._folder.cleanup()
+
+    def kill(self) -> None:
+        """Kill -9 of the viewer, frozen or not."""
+        assert self._process is not None
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
 
     def open(self, path: Path) -> None:
         """Open a recording and wait until it is loaded."""
@@ -101,7 +106,8 @@ class HeadlessViewer:
         try:
             yield
         finally:
-            os.killpg(self._process.pid, signal.SIGCONT)
+            if self._process.poll() is None:
+                os.killpg(self._process.pid, signal.SIGCONT)
 
     def tabs(self) -> list[str]:
         """Names of the tabs of the outermost container."""

@@ -100,6 +100,8 @@ class LiveMesh:
         Each peer is a client of a router, over mutual TLS, through a proxy of its own. Else peers find one another.
     topics, observer:
         What is subscribed to, and who notes it.
+    serve:
+        Port at which the recorder serves viewers.
     """
 
     def __init__(
@@ -110,8 +112,9 @@ class LiveMesh:
         star: bool = False,
         topics: Sequence[str] = tuple(TYPES),
         observer: type[Observer] = Observer,
+        serve: int | None = None,
     ) -> None:
-        self.star, self._topics, self._folder = star, topics, folder
+        self.star, self._topics, self._folder, self._serve = star, topics, folder, serve
         file = Path(shutil.copy(ROOT / "services" / "demo.toml", folder / "mesh.toml"))
         self._port = free_port()
         entry = f"{'tls' if star else 'tcp'}/127.0.0.1:{self._port}"
@@ -186,6 +189,7 @@ class LiveMesh:
             arguments += ["--start-at", "-"]
         if role == "recorder":
             arguments += ["--record", str(self._folder / "run.rrd")]
+            arguments += [] if self._serve is None else ["--serve", str(self._serve)]
         if not self.star:
             return [*arguments, "-e", self.configuration.network.entry]
         proxy = self.proxies[name] = Proxy(self._port).__enter__()

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import time
 import urllib.request
+from pathlib import Path
 from urllib.error import URLError
 
 import psutil
 import pytest
+from headless_viewer import why_not
+from live_viewers import PHASES, measure
 
 from services.recording.read import read_raw
 from services.viewers import free_port
@@ -53,3 +56,20 @@ def test_a_native_viewer_without_a_display_is_said_and_changes_nothing(start_run
     assert session.wait() == 0, session.output[1]
     assert any("no display?" in words for words in session.of("run")[0]["happened"])
     assert {row["last_step"] for row in session.of("estimator")} == {150}
+
+
+@pytest.mark.viewer
+@pytest.mark.skipif(why_not() is not None, reason=why_not() or "")
+def test_a_viewer_attached_frozen_and_killed_delays_nothing_and_leaves_no_gap(tmp_path: Path) -> None:
+    """Wide limits, for busy machines; ``benchmarks/viewers.py`` measures."""
+    outcome = measure(tmp_path, seconds=2.0, rate=25.0)
+    assert tuple(outcome.phases) == PHASES
+    assert outcome.gaps == []
+    assert outcome.messages > 1000
+    without = outcome.phases["no viewer"]
+    for phase in outcome.phases.values():
+        assert phase.missing == 0, phase
+        assert phase.steps > 10, phase
+        assert phase.p50_ms < 5.0 * without.p50_ms + 200.0, (phase, without)
+        assert phase.longest_pause_ms < 3.0 * without.longest_pause_ms + 2000.0, (phase, without)
+    assert outcome.recorded_steps >= sum(phase.steps for phase in outcome.phases.values())
