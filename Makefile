@@ -25,7 +25,8 @@ run: $(READY) ## run the demo: three sensors, three filters, a fusion, a recorde
 
 test: $(READY) lint ## lint, type check, and all tests that take less than ten minutes together
 	@sh tests/install_viewer_packages.sh
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n logical --dist loadfile -m "not (soak or live or viewer or alone)"
+	$(BIN)/python -m pytest -q -m "(live or viewer or alone) and not soak"
 
 lint: $(READY) ## ruff and mypy
 	$(BIN)/ruff check .

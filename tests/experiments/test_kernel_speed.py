@@ -118,6 +118,7 @@ def test_a_vertex_needs_as_many_free_entries_as_constraints() -> None:
         exact_vertex(A, b, np.zeros(20))
 
 
+@pytest.mark.alone
 def test_a_compiled_step_is_far_ahead_of_plain_numpy() -> None:
     model = stable_model(3)
     data = simulate(model, 500, seed=1)
@@ -130,6 +131,7 @@ def test_a_compiled_step_is_far_ahead_of_plain_numpy() -> None:
     assert cost["numpy"] / cost["loop"] > FLOOR
 
 
+@pytest.mark.alone
 def test_the_stopwatch_tells_work_from_more_work() -> None:
     cost = compare({"one": Candidate(lambda: sum(range(1000))), "ten": Candidate(lambda: sum(range(10_000)))}, 5, 0.01)
     assert 5.0 < cost["ten"] / cost["one"] < 20.0

@@ -61,6 +61,7 @@ def cost_per_step(mesh_of: Callable[..., Any], steps: int) -> float:
     return (time.process_time() - began) / steps
 
 
+@pytest.mark.alone
 def test_a_step_of_a_long_backlog_costs_no_more_than_one_of_a_short_backlog(mesh_of: Callable[..., Any]) -> None:
     """Else a peer that has fallen behind falls behind for good."""
     cost_per_step(mesh_of, 100)
