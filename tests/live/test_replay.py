@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgpack
+import numpy as np
 import pytest
 from local_mesh import LocalMesh
 from recorded_mesh import record
@@ -77,5 +78,5 @@ def test_a_recording_is_played_to_peers_over_zenoh(start, tmp_path: Path, demo: 
     assert all(row["inside"] == 1.0 for row in rows.values())
     received = read_recording(session.folder / "live.rrd").received
     played = [one for one in received if "/measurement/s1" in one.key]
-    pace = (played[-1].arrival_ns - played[0].arrival_ns) / (len(played) - 1)
-    assert pace == pytest.approx(20e6, rel=0.2), "the recorded pace"
+    pace = np.median(np.diff([one.arrival_ns for one in played]))
+    assert pace == pytest.approx(20e6, rel=0.3), "the recorded pace"

@@ -47,7 +47,7 @@ def test_the_tools_see_a_running_mesh(start: Start, mesh: Any) -> None:
     assert {line["name"] for line in lines(out) if line["type"] == "peer" and line["there"]} == PEERS - {"recorder"}
     rates = {f"{line['topic']}/{line['name']}": line["rate_hz"] for line in lines(out) if line["type"] == "key"}
     assert {"truth/plant", "measurement/s3", "posterior/cz", "fused/main", "health/box"} <= set(rates)
-    assert 20 < rates["truth/plant"] < 60
+    assert 5 < rates["truth/plant"] < 250, "50 Hz, on a machine that may be busy"
 
     code, out, _ = told(start, "echo", "posterior", "-n", "6", "--json", endpoint=at)
     assert code == 0
@@ -66,7 +66,7 @@ def test_the_tools_see_a_running_mesh(start: Start, mesh: Any) -> None:
     assert code == 0
     assert {line["key"] for line in lines(out)} == {"measurement/s1", "measurement/s2", "measurement/s3"}
     for line in lines(out):
-        assert 20 < line["rate_hz"] < 60
+        assert 5 < line["rate_hz"] < 250
         assert 0 < line["latency_p50_ms"] <= line["latency_p99_ms"]
 
     code, out, _ = told(start, "top", "--json", endpoint=at)
@@ -74,7 +74,7 @@ def test_the_tools_see_a_running_mesh(start: Start, mesh: Any) -> None:
     assert set(rows) == PEERS
     assert (rows["recorder"]["level"], code) == ("STALE", 4), "it was not started"
     assert rows["cz"]["step"] > 10
-    assert rows["cz"]["rate_hz"] > 10
+    assert rows["cz"]["rate_hz"] > 1
     assert rows["cz"]["step_ms"] > 0
 
     code, out, _ = told(start, "graph", "--live", endpoint=at)
