@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -246,7 +247,7 @@ class LSUCZ(Filter):
         """Σ log of a set's widths along the axes and their diagonals, axes in units of the box that is held."""
         widths = self._held.upper - self._held.lower
         scaled = np.diag(1.0 / np.where(widths > 0, widths, 1.0))
-        first, second = np.triu_indices(widths.size, 1)
+        first, second = _pairs(widths.size)
         directions = np.vstack([scaled, scaled[first] + scaled[second], scaled[first] - scaled[second]])
         low, high = ConstrainedZonotope.of_arrays(*body).ranges(directions)
         return float(np.log(np.maximum(high - low, np.finfo(np.float64).tiny)).sum())
@@ -261,6 +262,11 @@ class LSUCZ(Filter):
         low, high = self.support.ranges(self._arrays.C)
         box_low, box_high = image_of_box(self._arrays.C, *self.bounds())
         return np.maximum(low, box_low), np.minimum(high, box_high)
+
+
+@functools.cache
+def _pairs(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    return np.triu_indices(n, 1)
 
 
 def _within(held: Held, domain: Orthotope) -> Held:

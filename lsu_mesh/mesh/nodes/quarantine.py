@@ -36,20 +36,27 @@ class Quarantine:
         self._history = history
         self._settled = dict.fromkeys(sources, Record())
         """Records up to the oldest step that may be done again."""
+        self._records = self._settled
+        """Records up to the newest step."""
+        self._newest = 0
         self._verdicts: dict[int, dict[str, bool]] = {}
         """Of each later step, the sources that were there, and whether they were left out."""
         self.members: set[str] = set()
 
     def note(self, k: int, left_out: Collection[str], agreed: Collection[str], say: Say) -> list[Message]:
         """Note step k; the events of who goes in and who comes out."""
-        self._verdicts[k] = dict.fromkeys(agreed, False) | dict.fromkeys(left_out, True)
-        newest = max(self._verdicts)
-        for old in sorted(step for step in self._verdicts if step < newest - self._history):
-            self._settled = self._with(self._settled, self._verdicts.pop(old))
-        records = self._settled
-        for step in sorted(self._verdicts):
-            records = self._with(records, self._verdicts[step])
-        members = {name for name, record in records.items() if record.is_member}
+        verdict = dict.fromkeys(agreed, False) | dict.fromkeys(left_out, True)
+        self._verdicts[k] = verdict
+        if k > self._newest:
+            self._newest = k
+            self._records = self._with(self._records, verdict)
+            for old in sorted(step for step in self._verdicts if step < k - self._history):
+                self._settled = self._with(self._settled, self._verdicts.pop(old))
+        else:
+            self._records = self._settled
+            for step in sorted(self._verdicts):
+                self._records = self._with(self._records, self._verdicts[step])
+        members = {name for name, record in self._records.items() if record.is_member}
         changed, self.members = sorted(members ^ self.members), members
         return [say(name, name in members) for name in changed]
 
