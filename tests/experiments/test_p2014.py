@@ -137,7 +137,7 @@ def test_every_number_of_the_papers_tables_has_a_verdict(monkeypatch: pytest.Mon
     given = {name: [float(row[-3]) for row in tables[f"p2014-table-{name}"].rows if row[-1] != "–"] for name in "12"}
     for _, *numbers in TABLE_I.values():
         assert all(given["1"].count(number) >= 1 for number in numbers)
-    assert len(given["1"]) == 4 * (len(TABLE_I) + 2)
+    assert len(given["1"]) == 4 * len(TABLE_I) + 2
     assert given["2"] == [
         number for name, row in TABLE_II.items() for number in row * (1 if name in (WELL, THRICE, NINEFOLD) else 2)
     ]
