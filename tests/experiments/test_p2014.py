@@ -132,6 +132,7 @@ def test_a_step_takes_longer_with_more_states() -> None:
 
 def test_every_number_of_the_papers_tables_has_a_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(p2014, "QUICK_STEPS", 60)
+    monkeypatch.setattr(p2014_figures, "DIMENSIONS", (2, 4))
     outcome = p2014.run(quick=True)
     tables = {table.name: table for table in outcome.tables}
     given = {name: [float(row[-3]) for row in tables[f"p2014-table-{name}"].rows if row[-1] != "–"] for name in "12"}
