@@ -79,7 +79,8 @@ def checks(configuration: Configuration) -> Iterator[Check]:
     yield clock()
     yield disk(Path(configuration.recorder.path.replace("{mesh}", "x").replace("{time}", "x")).parent)
     yield memory(_available_memory(), len(configuration.peers()) + 1)
-    yield load(os.getloadavg()[0], len(os.sched_getaffinity(0)))
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    yield load(os.getloadavg()[0], cores)
     yield viewer(Path(sys.executable).with_name("rerun"), os.environ)
 
 

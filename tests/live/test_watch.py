@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import pty
 import signal
+import subprocess
+import termios
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -40,7 +46,7 @@ def mesh(start: Start) -> Iterator[Any]:
     assert session.wait() == 0
 
 
-def test_the_tools_see_a_running_mesh(start: Start, mesh: Any) -> None:
+def test_the_tools_see_a_running_mesh(start: Start, mesh: Any, lsu_mesh_command: list[str], root: Path) -> None:
     at = mesh.endpoint
     code, out, _ = told(start, "list", "--json", endpoint=at)
     assert code == 0
@@ -81,6 +87,27 @@ def test_the_tools_see_a_running_mesh(start: Start, mesh: Any) -> None:
     assert code == 0
     assert "filter cz – there" in out
     assert "recorder – not there" in out
+
+    assert top_on_a_terminal(at, lsu_mesh_command, root) == 0
+
+
+def top_on_a_terminal(endpoint: str, lsu_mesh_command: list[str], root: Path) -> int:
+    """The exit code of ``top`` after it has drawn a few times and was interrupted."""
+    terminal, other_end = pty.openpty()
+    termios.tcsetwinsize(terminal, (40, 130))
+    environment = {**os.environ, "PYTHONPATH": str(root), "TERM": "xterm"}
+    command = [*lsu_mesh_command, "top", "-e", endpoint]
+    with subprocess.Popen(command, stdout=other_end, stderr=other_end, stdin=other_end, env=environment) as process:
+        os.close(other_end)
+        shown = b""
+        while not (shown.count(b"the mesh:") > 2 and b"fusion" in shown):  # drawn again and again
+            shown += os.read(terminal, 65536)
+        process.send_signal(signal.SIGINT)
+        with contextlib.suppress(OSError):  # its end is the end of the terminal
+            while os.read(terminal, 65536):
+                pass
+    os.close(terminal)
+    return process.returncode
 
 
 def test_a_tool_that_finds_nobody_says_where_it_looked(start: Start) -> None:
