@@ -26,14 +26,16 @@ class Counting(Observer):
         super().__post_init__()
         self.truth = TrueStates(self.configuration)
         self.count = self.inside = 0
-        self.last_step: dict[str, int] = {}
+        self.newest_estimate: dict[str, tuple[int, int]] = {}
+        """Arrival and step of each estimator's newest estimate; the arrival is stamped before it waits to be looked at."""
         self.latencies_ms: list[float] = []
 
     def note(self, seen: Seen) -> None:
         message = seen.message
         self.count += 1
         self.inside += holds(message, self.truth[message.step])
-        self.last_step[message.name] = max(message.step, self.last_step.get(message.name, 0))
+        if message.step > self.newest_estimate.get(message.name, (0, 0))[1]:
+            self.newest_estimate[message.name] = seen.arrival_ns, message.step
         is_first = message.topic == "fused" and message.revision == 0
         if is_first and message.used and len(self.latencies_ms) < LONGEST_LATENCIES:
             self.latencies_ms.append((seen.arrival_ns - message.origin_ns) * 1e-6)
@@ -48,7 +50,8 @@ class Report:
     rate: float
     estimates: int
     inside: int
-    lost: float
+    lost: dict[str, float]
+    """Messages that each peer, or the observer, knows to exist and does not have, or had no room for."""
     behind: float
     lag: int
     p50_ms: float
@@ -75,13 +78,17 @@ class Report:
 
     def is_broken(self) -> bool:
         """Whether a promise was broken."""
-        return self.inside < self.estimates or self.lost > 0 or bool(self.grows())
+        return self.inside < self.estimates or any(self.lost.values()) or bool(self.grows())
+
+    def _words_of_lost(self) -> str:
+        losers = [f"{count:g} by {name}" for name, count in self.lost.items() if count]
+        return f"messages lost: {', '.join(losers)}" if losers else "no message lost"
 
     def table(self) -> str:
         """In Markdown."""
         told = (
             f"{self.seconds / 60:.1f} minutes at {self.rate:g} Hz: {self.inside} of {self.estimates} estimates hold "
-            f"the truth, {self.lost:g} messages lost, {self.behind:g} steps finished without publication, "
+            f"the truth, {self._words_of_lost()}, {self.behind:g} steps finished without publication, "
             f"{self.lag} steps behind at the end; a fused set came {self.p50_ms:.1f} ms after its oldest measurement "
             f"was sent (p99 {self.p99_ms:.1f} ms). Load {self.load[0]:.1f} at the start, {self.load[1]:.1f} at the end."
         )
@@ -110,7 +117,7 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
     with LiveMesh(folder, overrides, topics=topics, observer=Counting) as mesh:
         observer = mesh.observer
         assert isinstance(observer, Counting)
-        mesh.until(lambda: len(observer.last_step) == len(mesh.estimators()), "estimates flow")
+        mesh.until(lambda: len(observer.newest_estimate) == len(mesh.estimators()), "estimates flow")
         processes = {name: mesh.process(name) for _, name in mesh.peers}
         memory: dict[str, list[float]] = {name: [] for name in processes}
         began, load, used = time.monotonic(), os.getloadavg()[0], _processor_seconds(processes)
@@ -120,7 +127,7 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
             time.sleep(min(1.0, seconds / 40))
         took, now_used = time.monotonic() - began, _processor_seconds(processes)
         cores = {name: (now_used[name] - used[name]) / took for name in processes}
-        lag = mesh.due() - min(observer.last_step.values())
+        lag = max(mesh.due(arrival_ns) - step for arrival_ns, step in observer.newest_estimate.values())
         behind = sum(health[-1][1].counters.get("behind", 0.0) for health in observer.health.values())
         cuts = statistics.quantiles(observer.latencies_ms, n=100)
         mesh.process("plant").terminate()  # then what is under way comes to an end
@@ -131,7 +138,7 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
         mesh.until(
             lambda: all(h[-1][0] > since for n, h in observer.health.items() if n != "plant"), "a last word", 120
         )
-        lost = sum(mesh.gaps().values())
+        lost = mesh.gaps()
         rate = mesh.configuration.mesh.rate
         return Report(
             seconds, rate, observer.count, observer.inside, lost, behind, lag, cuts[49], cuts[98], memory, cores,
