@@ -27,7 +27,7 @@ class Counting(Observer):
         self.truth = TrueStates(self.configuration)
         self.count = self.inside = 0
         self.newest_estimate: dict[str, tuple[int, int]] = {}
-        """Arrival and step of each estimator's newest estimate; the arrival is stamped before it waits to be looked at."""
+        """Arrival and step of the newest of each estimator; the arrival is stamped before it waits here."""
         self.latencies_ms: list[float] = []
 
     def note(self, seen: Seen) -> None:
