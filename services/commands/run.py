@@ -29,6 +29,8 @@ READY_S = 60.0
 LINKS_S = 10.0
 """How long to wait for the last connections when all peers are there."""
 START_LEAD_S = 0.3
+MOST_AT_ONCE = 1024
+"""Messages taken before the children, and whoever says stop, are looked at again, however many more are waiting."""
 QUIET_S = 4.0
 """The run is over when the sources have ended and nothing new has come for so long."""
 
@@ -78,10 +80,11 @@ class Run:
         """Take what has come, publish what is due, and look after the children."""
         if self.player is not None:
             timeout = self.player.play(self.bus, self.report, self.clock.now(), timeout)
-        arrival = self.bus.next(timeout)
-        while arrival is not None:
+        for taken in range(MOST_AT_ONCE):
+            arrival = self.bus.next(0 if taken else timeout)
+            if arrival is None:
+                break
             self._take(arrival)
-            arrival = self.bus.next(0)
         if self.viewer is not None and (words := self.viewer.end_words()):
             self.note(words)
         for child, words in self.supervisor.watch(time.monotonic()):
