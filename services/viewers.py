@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -66,9 +68,9 @@ class Viewer:
     def close(self) -> None:
         """End the web viewer with the run; a native one stays for the person who looks at it."""
         if self.is_web and self.process is not None and self.process.poll() is None:
-            self.process.terminate()
+            os.killpg(self.process.pid, signal.SIGTERM)  # the program is a child of Rerun's script of that name
             try:
                 self.process.wait(timeout=3.0)
             except subprocess.TimeoutExpired:
-                self.process.kill()
+                os.killpg(self.process.pid, signal.SIGKILL)
                 self.process.wait()

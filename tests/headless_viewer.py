@@ -22,7 +22,7 @@ from services.recording.mend import quiet_environment
 
 VULKAN_DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
 PATIENCE_S = 60.0
-HARMLESS = ("Software rasterizer detected",)
+HARMLESS = ("Software rasterizer detected", "Failed to render screenshot requested")
 """Warnings about the machine, not about the recording."""
 GLIDE_S, SLOWEST_S = 0.5, 10.0
 """Plots glide to their ranges. Pictures so far apart that are equal show that they are there; the longest to wait."""

@@ -13,7 +13,7 @@ from headless_viewer import why_not
 from live_viewers import PHASES, measure
 
 from services.recording.read import read_raw
-from services.viewers import free_port
+from services.viewers import Viewer, free_port
 
 pytestmark = pytest.mark.live
 
@@ -35,18 +35,37 @@ def test_the_web_viewer_is_served_on_the_loopback_alone_and_ends_with_the_run(st
     session = start_run("--steps", "300", "--rate", "25", "--record", "web.rrd", "--web", str(port))
     assert "<html" in page(port)
     viewer = session.child("--serve-web")
-    processes = [viewer, session.child("recorder recorder")]
+    processes = [viewer, *viewer.children(), session.child("recorder recorder")]
     listening = [c.laddr for p in processes for c in p.net_connections("tcp") if c.status == psutil.CONN_LISTEN]
     assert len(listening) >= 2
     assert {address.ip for address in listening} == {"127.0.0.1"}
-    viewer.suspend()
+    whole = [viewer, *viewer.children()]  # Rerun's script and its program
+    assert len(whole) == 2
+    for process in whole:
+        process.suspend()
     time.sleep(1.0)
-    viewer.kill()
+    for process in whole:
+        process.kill()
     assert session.wait() == 0, session.output[1]
     assert "http://127.0.0.1" in session.output[1]
     assert any("the viewer ended" in words for words in session.of("run")[0]["happened"])
     steps = [m for m in read_raw(session.folder / "web.rrd") if "/truth/" in m.key]
     assert len(steps) == 300, "a viewer that freezes and dies leaves no gap"
+
+
+def test_the_web_viewer_ends_with_all_its_processes() -> None:
+    viewer = Viewer(free_port(), is_web=True, web_port=free_port())
+    assert "http://127.0.0.1" in viewer.open()
+    assert viewer.process is not None
+    page(viewer.web_port)
+    script = psutil.Process(viewer.process.pid)
+    whole = [script, *script.children(recursive=True)]
+    assert len(whole) == 2
+    viewer.close()
+    _, alive = psutil.wait_procs(whole, timeout=10.0)
+    for process in alive:
+        process.kill()
+    assert alive == []
 
 
 def test_a_native_viewer_without_a_display_is_said_and_changes_nothing(start_run, monkeypatch) -> None:  # type: ignore[no-untyped-def]
