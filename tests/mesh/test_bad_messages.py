@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import time
 import tracemalloc
 from collections.abc import Iterator
@@ -33,6 +34,8 @@ from lsu_mesh.mesh.simulator.recorder import RecorderSink
 ROOT = Path(__file__).resolve().parents[2]
 LONGEST_NS = 10_000_000
 """Of the thread's processor time, per message."""
+FUZZED = int(os.environ.get("LSU_MESH_FUZZED", "1000000"))
+"""Messages per decoder and node in the full run."""
 MONSTERS = [
     math.nan, math.inf, -math.inf, 1e308, -1e308, 5e-324, 0, -1, 2**63, 2**64 - 1, -(2**63), True, None, "", "x" * 5000,
     b"\x00", [], [[]], {}, {"type": "orthotope"}, [math.nan], [1e308] * 3, [[1e308] * 3] * 3, [0.0] * 5000,
@@ -304,10 +307,10 @@ def test_a_million_hostile_messages_per_node(number: int) -> None:
     assault(configuration, node, 0, 2_000)
     process = psutil.Process()
     before = process.memory_info().rss
-    slowest = [max(assault(configuration, node, seed, 10_000)) for seed in range(1, 101)]
+    slowest = [max(assault(configuration, node, seed, FUZZED // 100)) for seed in range(1, 101)]
     grown = process.memory_info().rss - before
     print(
-        f"{node.role} {node.name}: 1,000,000 messages, slowest {max(slowest) * 1e-6:.2f} ms of processor time, "
+        f"{node.role} {node.name}: {FUZZED:,} messages, slowest {max(slowest) * 1e-6:.2f} ms of processor time, "
         f"memory grew by {grown / 2**20:.1f} MiB",
         flush=True,
     )
@@ -323,7 +326,7 @@ def test_a_million_broken_payloads_per_decoder(topic: str) -> None:
     valid = encode(example(topic))
     process = psutil.Process()
     before, slowest, sound = process.memory_info().rss, 0, 0
-    for _ in range(1_000_000):
+    for _ in range(FUZZED):
         payload = bytearray(valid)
         payload[int(rng.integers(len(payload)))] = int(rng.integers(256))
         broken = bytes(payload[: int(rng.integers(len(payload) + 1))] if rng.random() < 0.3 else payload)
@@ -332,7 +335,7 @@ def test_a_million_broken_payloads_per_decoder(topic: str) -> None:
         slowest = max(slowest, time.thread_time_ns() - began)
     grown = process.memory_info().rss - before
     print(
-        f"decoder of {topic}: 1,000,000 payloads, {sound} of them sound, slowest {slowest * 1e-6:.2f} ms of "
+        f"decoder of {topic}: {FUZZED:,} payloads, {sound} of them sound, slowest {slowest * 1e-6:.2f} ms of "
         f"processor time, memory grew by {grown / 2**20:.1f} MiB",
         flush=True,
     )
