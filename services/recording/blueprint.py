@@ -24,6 +24,8 @@ SETTLING = 20
 """So many steps are left out of plots over the whole run: the first sets are as wide as the prior and hide the rest."""
 MARGIN = 0.14
 """Share of a plot over the whole run that stays free for its legend."""
+LEGEND = 0.28
+"""The same of a plot of a window of steps, which is narrower."""
 Part = rrb.View | rrb.Container
 
 
@@ -185,19 +187,22 @@ def _plot(
     legend: bool = False,
     outlined: Sequence[str] = (),
 ) -> Part:
-    """Series in a window of steps that ends at the cursor; all such plots share their time axis."""
+    """Series in a window of steps that ends at the cursor. All share their time axis, but for those with a legend."""
     seconds = WINDOW * names.configuration.mesh.dt
     now = rrb.TimeRangeBoundary.cursor_relative()
+    begin = rrb.TimeRangeBoundary.cursor_relative(seq=-WINDOW)
+    end = rrb.TimeRangeBoundary.cursor_relative(seq=round(LEGEND * WINDOW))
+    linked = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
     window = [
-        rrb.VisibleTimeRange(STEP, start=rrb.TimeRangeBoundary.cursor_relative(seq=-WINDOW), end=now),
+        rrb.VisibleTimeRange(STEP, start=begin, end=now),
         rrb.VisibleTimeRange(SIM_TIME, start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds), end=now),
     ]
     return rrb.TimeSeriesView(
         name=name,
         origin="/",
         contents=contents,
-        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        axis_x=rrb.TimeAxis(view_range=rrb.TimeRange(begin, end)) if legend else linked,
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
         time_ranges=window,
         overrides={entity: outline() for entity in outlined} or None,
     )

@@ -208,7 +208,7 @@ class Space:
         """The true state, and how far its cross must go to be seen outside of the sets that hold it."""
         place, reach = np.zeros(3), np.zeros(3)
         place[: len(self._axes)] = np.array(x)[list(self._axes)]
-        if len(self._axes) == 2:
+        if len(self._axes) < 3:
             place[2] = IN_FRONT
         scale = self._frames[frame.ALL].scale
         if scale is not None and len(self._axes) == 3:
