@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Iterable
 
@@ -25,6 +26,8 @@ def run_node(node: Node, settings: SessionSettings, stop: Stop) -> int:
     """Run a node until it is told to stop; returns the exit code."""
     clock = Clock()
     node.rehearse()
+    gc.collect()
+    gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
     with Bus(settings, clock) as bus:
         peer = Peer(node, bus, clock)
         peer.declare()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import secrets
 import sys
@@ -56,6 +57,8 @@ def run_recorder(
         with Bus(settings, clock) as bus:
             service = RecorderService(configuration, recorder, bus, clock)
             service.declare()
+            gc.collect()
+            gc.freeze()  # as every peer does
             print(f"recorder: on the mesh, writing {part}", file=sys.stderr)
             while not stop:
                 service.turn()
