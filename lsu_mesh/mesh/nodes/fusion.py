@@ -317,7 +317,10 @@ class FusionNode(Estimator):
     def _restart(self, sources: Sequence[Source]) -> bool:
         """Drop the own prediction and hold what the sources alone say; False where they contradict one another."""
         first, *others = sources
-        self.engine.reset(first.support)
+        try:
+            self.engine.reset(first.support)
+        except InconsistentData:  # the source's own set is empty: it agrees with nobody
+            return False
         self._met = first.bounds
         return self._try_all(others)
 
