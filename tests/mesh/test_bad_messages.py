@@ -283,6 +283,30 @@ def test_a_set_of_monstrous_complexity_is_refused() -> None:
     assert node.gate.refused == {"complexity": 1}
 
 
+@pytest.mark.parametrize("role", ["fusion", "filter"])
+def test_a_set_that_is_empty_kills_nobody(role: str) -> None:
+    configuration = configuration_of()
+    nothing = {
+        "type": "constrained_zonotope",
+        "center": [0.0] * 3,
+        "generators": [[0.1], [0.1], [0.1]],
+        "A": [[1.0]],
+        "b": [9.0],
+    }
+    fields = fields_of("posterior") | {"model": configuration.digest(), "lower": [-1.0] * 3, "upper": [1.0] * 3}
+    fields |= {"point": [0.0] * 3, "support": nothing, "step": 9, "src": "filter/cz", "status": "ok"}
+    drive = fields_of("input") | {"model": configuration.digest(), "u": [0.0], "step": 9, "src": "plant/plant"}
+    node = (
+        FusionNode(configuration, "main", "f" * 16) if role == "fusion" else FilterNode(configuration, "cz", "f" * 16)
+    )
+    node.deliver("lsu/v1/demo/input/plant", msgpack.packb(drive), SECOND)
+    node.deliver("lsu/v1/demo/posterior/cz", msgpack.packb(fields), SECOND)
+    assert node.gate.refused == {}
+    for second in range(2, 6):
+        node.tick(second * SECOND)
+    assert node.last_posterior is None or node.last_posterior.status != "ok"
+
+
 def measurement(configuration: Configuration, step: int, seq: int) -> bytes:
     fields = fields_of("measurement") | {"src": "sensor/s1", "step": step, "seq": seq, "y": [0.0]}
     return msgpack.packb(fields | {"model": configuration.digest()})

@@ -408,8 +408,12 @@ class Estimator(Node):
         candidate = self._candidate
         if candidate is None or self.epochs.is_abandoned(candidate) or self._input_missing(candidate.step):
             return False
+        try:
+            self._begin(candidate.step, to_support(candidate.support), candidate.reference, restarted=True)
+        except InconsistentData:  # it is empty: whoever sent it was wrong
+            self._candidate = None
+            return False
         self.rely(candidate)
-        self._begin(candidate.step, to_support(candidate.support), candidate.reference, restarted=True)
         return True
 
     def _start_from_prior(self, first: int) -> bool:

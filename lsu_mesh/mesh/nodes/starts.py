@@ -87,7 +87,10 @@ class Starts:
         if abandons and self._epochs.is_descendant(fused):
             return None
         used: list[Reference] = []
-        engine.reset(to_support(fused.support))
+        try:
+            engine.reset(to_support(fused.support))
+        except InconsistentData:  # it is empty: whoever sent it was wrong
+            return None
         for j in range(fused.step, k):
             u = inputs.get(j)
             if engine.model.input_count and u is None:
