@@ -30,7 +30,7 @@ from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.nodes.signs import Signs
 from lsu_mesh.mesh.nodes.silence import Silences, input_key, start_keys
-from lsu_mesh.mesh.nodes.step import Base, Combined, Step
+from lsu_mesh.mesh.nodes.step import Base, Combined, Step, news
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
@@ -292,11 +292,11 @@ class Estimator(Node):
         return messages if posterior is None else [*messages, posterior]
 
     def _publish(self, k: int, step: Step, combined: Combined, now: int) -> Posterior | None:
-        """The posterior's message, or None when the step was published before with the same set."""
+        """The posterior's message, or None when the step was published before with the same set and sources."""
         support, old = to_message(self.engine.support), step.published
         box = tuple(bound.tolist() for bound in self.published_bounds())
-        said = None if old is None else (old.support, (old.lower, old.upper), old.status, old.epoch, old.guarantee)
-        if old is not None and said == (support, box, combined.status, self.epochs.number, self.guarantee):
+        told = (support, box, combined.status, self.epochs.number, self.guarantee, list(combined.missing))
+        if old is not None and told == news(old):
             self._base, self._used = old.reference, ()
             return None
         step.revision += 1

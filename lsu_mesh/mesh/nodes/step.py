@@ -44,3 +44,9 @@ class Combined:
     origin: int | None
     cause: str | None = None
     gain: float | None = None
+
+
+def news(posterior: Posterior) -> tuple[object, ...]:
+    """What makes a step worth telling again when it changes: the set, what it is worth, and who is missing in it."""
+    box = posterior.lower, posterior.upper
+    return posterior.support, box, posterior.status, posterior.epoch, posterior.guarantee, posterior.missing
