@@ -29,8 +29,8 @@ from services.recording.topology import Topology
 
 NOTHING: Mapping[str, str] = MappingProxyType({})
 FLUSH_TIMEOUT_S = 5.0
-HANGS_S = 8.0
-"""A flush that does not even keep its own time limit hangs for ever."""
+HANGS_S = 20.0
+"""Drawing, sending and a flush that keeps its own time limit take less on a busy machine; more is for ever."""
 CLOSING_S = 60.0
 """How long a sound file may take to end."""
 WRITER_ENDED = "File-writer thread shut down"
@@ -151,22 +151,28 @@ class Recorder:
         self._draw_departures(now_ns, AFTERMATH_NS)
         if now_ns >= self._next_flush_ns and not self._broken:
             self._next_flush_ns = now_ns + self._interval_ns
-            if now_ns >= self._next_drawing_ns:
+            draws = now_ns >= self._next_drawing_ns
+            if draws:
                 self._next_drawing_ns = now_ns + self._drawing_interval_ns
-                self._send_drawings()
-            self._store()
+            self._put(lambda: self._store(draws))
 
     def flush(self) -> None:
         """Write everything that waits to the file."""
-        self._send_drawings()
-        self._store()
+        self._put(lambda: self._store(draws=True))
+
+    def _put(self, store: Callable[[], None]) -> None:
+        """Hand what waits to Rerun and have it written; any of its calls may hang once its file writer has ended."""
+        if not ends_within(HANGS_S, store):
+            self._guarded("giving up", self._give_up)
 
     def _send_drawings(self) -> None:
         parts = self._estimates, self._space, self._outputs, self._half_widths
         for part in (*parts, self._status, self._events, self._topology):
             self._guarded(f"drawing {type(part).__name__.lower()}", part.flush)
 
-    def _store(self) -> None:
+    def _store(self, draws: bool) -> None:
+        if draws:
+            self._send_drawings()
         unflushed, self._unflushed = self._unflushed, []
         stored = self._guarded("storing raw payloads", self._raw.flush)
         written = self._guarded(f"writing {self.path}", self._write)
@@ -177,11 +183,13 @@ class Recorder:
 
     def _write(self) -> None:
         try:
-            if ends_within(HANGS_S, lambda: self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S)):
-                return
+            self._stream.flush(timeout_sec=FLUSH_TIMEOUT_S)
         except RuntimeError as error:
             if WRITER_ENDED not in str(error):
                 raise
+            self._give_up()
+
+    def _give_up(self) -> None:
         free = shutil.disk_usage(self.path.parent).free
         reason = f"only {free} bytes are free there" if free < 2**20 else "Rerun's file writer has ended"
         self._broken = f"{self.path} takes no more data: {reason}; messages that are lost"
@@ -199,9 +207,12 @@ class Recorder:
                 "drawing events", lambda: self._events.tell("recorder", moment, "INFO", f"the run ended: {names}")
             )
         if not self._broken:
-            self._guarded("drawing space", self._space.finish)
-            self.flush()
+            self._put(self._finish)
         self._guarded("closing the file", self._disconnect)
+
+    def _finish(self) -> None:
+        self._guarded("drawing space", self._space.finish)
+        self._store(draws=True)
 
     def _disconnect(self) -> None:
         self.has_ended = ends_within(HANGS_S if self._broken else CLOSING_S, self._stream.disconnect)

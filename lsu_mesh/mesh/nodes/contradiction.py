@@ -53,15 +53,14 @@ def update_without_contradicting_strips(engine: Filter, y: Vector) -> Dropped:
 def widen(engine: Filter, y: Vector) -> float | None:
     """Update with r widened by the smallest factor, to 1 %, that explains y; None where no factor does (r = 0)."""
     r = engine.model.r
-    before = engine.snapshot()
     low, high = 1.0, 2.0
-    while not _explains(engine, y, high * r, before):
+    while not explains(engine, y, high * r):
         low, high = high, 2.0 * high
         if high > WIDEST:
             return None
     while high - low > PRECISION * low:
         middle = 0.5 * (low + high)
-        if _explains(engine, y, middle * r, before):
+        if explains(engine, y, middle * r):
             high = middle
         else:
             low = middle
@@ -69,7 +68,9 @@ def widen(engine: Filter, y: Vector) -> float | None:
     return high
 
 
-def _explains(engine: Filter, y: Vector, r: Vector, before: object) -> bool:
+def explains(engine: Filter, y: Vector, r: Vector | None = None) -> bool:
+    """Whether the data y (m,) with half-widths r are not proved to miss the engine's set; it stays as it is."""
+    before = engine.snapshot()
     try:
         engine.update(y, r)
     except InconsistentData:

@@ -28,6 +28,7 @@ from lsu_mesh.mesh.messages import (
 from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.reach import Reach
+from lsu_mesh.mesh.nodes.rehearsal import rehearse
 from lsu_mesh.mesh.nodes.signs import Signs
 from lsu_mesh.mesh.nodes.silence import Silences, input_key, start_keys
 from lsu_mesh.mesh.nodes.step import Base, Combined, Step, news
@@ -38,8 +39,6 @@ from lsu_mesh.supports.support import Support, Vector
 About = dict[str, str | int | float | None]
 START_GRACE = SECOND // 2
 """How long a late joiner listens to the past before it chooses where to start."""
-REHEARSED_STEPS = 6
-"""So many steps bring a limited complexity into play."""
 BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
 INPUT_LOST = 256
@@ -365,13 +364,17 @@ class Estimator(Node):
 
     def _start_over(self, k: int, why: str, now: int) -> None:
         """Nothing is known behind step k: join again there, like a peer that starts late."""
-        for old in [j for j in self._steps if j <= k]:
-            del self._steps[old]
-        self.current, self._dirty, self._candidate, self._first_evidence = None, None, None, now
-        self.reach.lose()
+        self.join_again(k + 1, now)
         self._counts["resets"] += 1
         text = f"{why}; starting again behind it"
         self._remarks.append(self.event("ERROR", "started-over", text, now, k, {"step": k}))
+
+    def join_again(self, first: int, since: int) -> None:
+        """Forget what is before a step and start from there, as a peer that has listened since then."""
+        for old in [j for j in self._steps if j < first]:
+            del self._steps[old]
+        self.current, self._dirty, self._candidate, self._first_evidence = None, None, None, since
+        self.reach.lose()
 
     def _rewind(self, k: int) -> None:
         """Return to the set before the data of step k, so that everything since is done again."""
@@ -459,15 +462,7 @@ class Estimator(Node):
             step.before = None
 
     def rehearse(self) -> None:
-        before, model = self.engine.snapshot(), self.engine.model
-        for _ in range(REHEARSED_STEPS):
-            if model.output_count:
-                self.engine.update(self.engine.predict_output().point)
-            self.engine.condition(self.engine.support.interval_hull())
-            to_message(self.engine.support)
-            self.engine.bounds()
-            self.engine.predict(np.zeros(model.input_count) if model.input_count else None)
-        self.engine.restore(before)
+        rehearse(self.engine)
 
     # -- what is said of the node
 

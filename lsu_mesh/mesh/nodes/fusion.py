@@ -128,10 +128,7 @@ class FusionNode(Estimator):
         if not any(self._is_start(k) for k in self._steps if k >= first):
             return []
         skipped, k = first - self.current, self.current
-        for old in [j for j in self._steps if j < first]:
-            del self._steps[old]
-        self.current, self._dirty, self._candidate, self._first_evidence = None, None, None, now - START_GRACE
-        self.reach.lose()
+        self.join_again(first, now - START_GRACE)
         self._counts["skipped"] += skipped
         text = f"too far behind: {skipped} steps from step {k} on are skipped; going on from what the sources say"
         return [self.event("WARN", "skipped-ahead", text, now, k, {"step": k, "skipped": skipped})]

@@ -10,6 +10,7 @@ import numpy as np
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.messages import Fused, Input, Reference
+from lsu_mesh.mesh.nodes.contradiction import explains
 from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.nodes.step import Base
 from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, SOUND
@@ -72,7 +73,7 @@ class Starts:
         met = None
         for start in starts:
             engine.restore(start.set)
-            if not contradicts(engine, y):
+            if explains(engine, y):
                 met = start
                 break
         engine.restore(before)
@@ -101,17 +102,6 @@ class Starts:
                 return None
             used += [] if u is None else [u.reference]
         return Start(engine.snapshot(), fused.reference, f"the fused set of step {fused.step}", used, fused)
-
-
-def contradicts(engine: Filter, y: Vector) -> bool:
-    """Whether the data are proved to miss the engine's set; it stays as it is."""
-    before = engine.snapshot()
-    try:
-        engine.update(y)
-    except InconsistentData:
-        return True
-    engine.restore(before)
-    return False
 
 
 def _made(engine: Filter, support: Orthotope, base: Base, words: str) -> Start:

@@ -157,11 +157,6 @@ class SimulatedMesh:
         self._boots = 0
         self._decoder = SharedDecoder()
         self._listeners: dict[str, list[str]] = {}
-        self._cache = (
-            max(256, int(6 * configuration.mesh.rate))
-            if configuration.network.cache is None
-            else (configuration.network.cache)
-        )
         for role, name in configuration.peers():
             self._begin(role, name)
 
@@ -194,7 +189,7 @@ class SimulatedMesh:
         self._boots += 1
         node = self._made(role, name, f"{self._boots:08x}{self._rng.getrandbits(32):08x}")
         node.gate.decoder = self._decoder.decode
-        process = Process(self, node, self._plan.skews.get(name, Skew()), self._cache)
+        process = Process(self, node, self._plan.skews.get(name, Skew()), self.configuration.cached)
         self.witness.began(node)
         self._greet(process, at)
         self.processes[name] = process
