@@ -31,6 +31,8 @@ NOTHING: Mapping[str, str] = MappingProxyType({})
 FLUSH_TIMEOUT_S = 5.0
 HANGS_S = 20.0
 """Drawing, sending and a flush that keeps its own time limit take less on a busy machine; more is for ever."""
+LEAST_FREE = 2**20
+"""Bytes that are left on the disk, beside what two flushes take."""
 CLOSING_S = 60.0
 """How long a sound file may take to end."""
 WRITER_ENDED = "File-writer thread shut down"
@@ -109,6 +111,8 @@ class Recorder:
         self._broken = ""
         """Why nothing more is recorded, once that is so."""
         self._unflushed: list[tuple[str, str, int]] = []
+        self._size = 0
+        """Of the file, when it was last looked at."""
         self._counts: Counter[str] = Counter()
         self._closed = False
         self.has_ended = True
@@ -162,8 +166,17 @@ class Recorder:
 
     def _put(self, store: Callable[[], None]) -> None:
         """Hand what waits to Rerun and have it written; any of its calls may hang once its file writer has ended."""
+        if self._guarded(f"looking at {self.path.parent}", self._look_at_space) and self._broken:
+            return
         if not ends_within(HANGS_S, store):
             self._guarded("giving up", self._give_up)
+
+    def _look_at_space(self) -> None:
+        """Give up while there is room to end the file: after an error of the disk Rerun may hang for ever."""
+        size, free = self.path.stat().st_size, shutil.disk_usage(self.path.parent).free
+        grown, self._size = size - (self._size or size), size
+        if free < LEAST_FREE + 2 * grown:
+            self._stop(f"only {free} bytes are free there")
 
     def _send_drawings(self) -> None:
         parts = self._estimates, self._space, self._outputs, self._half_widths
@@ -191,9 +204,11 @@ class Recorder:
 
     def _give_up(self) -> None:
         free = shutil.disk_usage(self.path.parent).free
-        reason = f"only {free} bytes are free there" if free < 2**20 else "Rerun's file writer has ended"
+        self._stop(f"only {free} bytes are free there" if free < LEAST_FREE else "Rerun's file writer has ended")
+
+    def _stop(self, reason: str) -> None:
         self._broken = f"{self.path} takes no more data: {reason}; messages that are lost"
-        self._counts[self._broken] = 0
+        self._counts[self._broken] = len(self._unflushed)
 
     def close(self) -> None:
         """Flush, and end the file with its footer; the second call does nothing."""
