@@ -16,66 +16,74 @@ MOST_HOLES = 256
 
 @dataclass
 class _Run:
-    """Numbers of one (key, boot): all up to ``complete`` have come, some after it."""
+    """Numbers of one (key, boot) from ``first`` on: all up to ``complete`` have come or are lost, some after it."""
 
+    boot: str
+    first: int
     complete: int
     newest: int
     beyond: set[int] = field(default_factory=set)
+    lost: list[tuple[int, int]] = field(default_factory=list)
+    """Holes that were given up: first and last number of each."""
 
 
 class Ledger:
-    """Counts per key, from the first number that came: up to ``flushed[key]`` nothing is missing but ``lost``.
+    """Counts per key, from the first number that came: up to ``flushed[key]`` nothing is missing but what is lost.
 
-    Numbers of another boot start a new count; the key's newest boot is the one that is told.
+    Numbers of another boot start a new count, which is told from the next flush on.
     """
 
     def __init__(self) -> None:
-        self._runs: dict[str, tuple[str, _Run]] = {}
+        self._runs: dict[str, _Run] = {}
         self._old: dict[str, deque[str]] = {}
+        self._told: dict[str, _Run] = {}
+        """What ``flushed`` counts; until the next flush that may be an earlier boot."""
         self.flushed: dict[str, int] = {}
-        self.boots: dict[str, str] = {}
-        """The boot that ``flushed`` counts, by key."""
-        self.first: dict[str, int] = {}
-        """The first number that came of that boot."""
-        self.lost: dict[str, list[tuple[int, int]]] = {}
-        """Holes of that boot that were given up: first and last number of each."""
 
     def note(self, key: str, boot: str, seq: int) -> None:
         """A message was taken; it is stored with the next flush."""
-        known = self._runs.get(key)
-        if known is None or known[0] != boot:
+        run = self._runs.get(key)
+        if run is None or run.boot != boot:
             old = self._old.setdefault(key, deque(maxlen=MOST_BOOTS))
             if boot in old:
                 return  # a straggler of an earlier life: stored, but that life is not counted any more
-            if known is not None:
-                old.append(known[0])
-            self._runs[key] = (boot, _Run(seq, seq))
-            self.first[key] = seq
-            self.lost[key] = []
-            return
-        run = known[1]
-        if seq > run.complete:
+            if run is not None:
+                old.append(run.boot)
+            self._runs[key] = _Run(boot, seq, seq, seq)
+        elif seq > run.complete:
             run.beyond.add(seq)
             run.newest = max(run.newest, seq)
-            self._complete(key, run)
+            _complete(run)
 
-    def _complete(self, key: str, run: _Run) -> None:
-        while run.beyond:
-            if run.complete + 1 not in run.beyond:
-                if run.newest - run.complete <= WINDOW:
-                    return
-                following = min(run.beyond)
-                self.lost[key] = [*self.lost[key][1 - MOST_HOLES :], (run.complete + 1, following - 1)]
-                run.complete = following - 1
-            run.complete += 1
-            run.beyond.remove(run.complete)
+    def boot(self, key: str) -> str:
+        """The boot that ``flushed`` counts."""
+        return self._told[key].boot
+
+    def first(self, key: str) -> int:
+        """The first number that came of that boot."""
+        return self._told[key].first
+
+    def lost(self, key: str) -> list[tuple[int, int]]:
+        """Holes of that boot that were given up: first and last number of each."""
+        return self._told[key].lost
 
     def is_lost(self, key: str, seq: int) -> bool:
-        """Whether a number of the key's present boot was given up."""
-        return any(first <= seq <= last for first, last in self.lost[key])
+        """Whether a number of that boot was given up."""
+        return any(first <= seq <= last for first, last in self.lost(key))
 
     def flush(self) -> None:
         """Everything that was noted is stored now."""
-        for key, (boot, run) in self._runs.items():
-            self.flushed[key] = run.complete
-            self.boots[key] = boot
+        self._told = dict(self._runs)
+        self.flushed = {key: run.complete for key, run in self._runs.items()}
+
+
+def _complete(run: _Run) -> None:
+    while run.beyond:
+        if run.complete + 1 not in run.beyond:
+            if run.newest - run.complete <= WINDOW:
+                return
+            following = min(run.beyond)
+            run.lost = [*run.lost[1 - MOST_HOLES :], (run.complete + 1, following - 1)]
+            run.complete = following - 1
+        run.complete += 1
+        run.beyond.remove(run.complete)

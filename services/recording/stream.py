@@ -23,6 +23,8 @@ from services.recording.blueprint import blueprint
 from services.recording.mend import mend
 from services.recording.names import Names
 
+LONGEST_INDEXED_S = 300.0
+"""Runs that are longer have no index of their chunks at the end of the file: until then it would grow in memory."""
 PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "rerun-sdk")
 
 
@@ -46,7 +48,7 @@ def open_stream(
         recording_id=(continues and recording_id(continues)) or f"{configuration.mesh.name}-{os.urandom(8).hex()}",
         batcher_config=rr.ChunkBatcherConfig(flush_tick=configuration.recorder.flush),
     )
-    sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(path)]
+    sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(path, write_footer=_is_short(configuration))]
     if serve_port is not None:
         sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=serve_port, server_memory_limit="256MB"))
     stream.set_sinks(*sinks, default_blueprint=blueprint(names))
@@ -54,6 +56,11 @@ def open_stream(
     properties: dict[str, Any] = run_description(configuration) | dict(run_properties)
     stream.send_property("lsu_mesh", rr.AnyValues(**properties))
     return stream
+
+
+def _is_short(configuration: Configuration) -> bool:
+    steps, rate = configuration.mesh.steps, configuration.mesh.rate or 1.0 / configuration.mesh.dt
+    return steps is not None and steps <= LONGEST_INDEXED_S * rate
 
 
 def recording_id(path: Path) -> str | None:

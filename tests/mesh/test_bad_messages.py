@@ -8,7 +8,7 @@ import math
 import os
 import time
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.keys import key
-from lsu_mesh.mesh.messages import MAX_PAYLOAD, TYPES, Message, Refused, decode, encode, example
+from lsu_mesh.mesh.messages import MAX_PAYLOAD, TYPES, Message, Reference, Refused, decode, encode, example
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
@@ -138,6 +138,13 @@ def configuration_of(*overrides: str) -> Configuration:
     return load(ROOT / "services" / "demo.toml", given_)
 
 
+class ForgetfulDisk(list[Reference]):
+    """What a recorder stores is not in its memory."""
+
+    def __iadd__(self, stored: Iterable[Reference]) -> ForgetfulDisk:  # type: ignore[override]
+        return self
+
+
 def nodes_of(configuration: Configuration) -> list[Node]:
     """One node of each role and kind."""
     boots = (f"{number:016x}" for number in itertools.count(1))
@@ -146,7 +153,7 @@ def nodes_of(configuration: Configuration) -> list[Node]:
     made.append(PlantNode(configuration, "plant", next(boots), Schedule(SECOND, 50.0)))
     made += [
         SimulatedSensorNode(configuration, "s1", next(boots)),
-        RecorderSink(configuration, "recorder", next(boots), []),
+        RecorderSink(configuration, "recorder", next(boots), ForgetfulDisk()),
     ]
     return made
 

@@ -20,7 +20,7 @@ def test_everything_from_the_first_to_the_flushed_number_has_come(numbers: list[
         while expected + 1 in numbers[:count]:
             expected += 1
         assert ledger.flushed == {"key": expected}
-        assert ledger.lost == {"key": []}
+        assert ledger.lost("key") == []
 
 
 def test_nothing_is_flushed_before_it_is_flushed() -> None:
@@ -39,7 +39,7 @@ def test_a_number_that_never_comes_is_given_up_and_counted() -> None:
         ledger.note("key", A, number)
     ledger.flush()
     assert ledger.flushed == {"key": WINDOW + 2}
-    assert ledger.lost == {"key": [(1, 1)]}
+    assert ledger.lost("key") == [(1, 1)]
     assert ledger.is_lost("key", 1)
 
 
@@ -49,7 +49,7 @@ def test_a_monstrous_number_costs_nothing() -> None:
         ledger.note("key", A, number)
     ledger.flush()
     assert ledger.flushed == {"key": 2**63 - 1}
-    assert ledger.lost == {"key": [(1, 2**62 - 1), (2**62 + 1, 2**63 - 2)]}
+    assert ledger.lost("key") == [(1, 2**62 - 1), (2**62 + 1, 2**63 - 2)]
 
 
 def test_a_new_life_counts_anew_and_stragglers_of_the_old_one_change_nothing() -> None:
@@ -59,4 +59,14 @@ def test_a_new_life_counts_anew_and_stragglers_of_the_old_one_change_nothing() -
     ledger.note("key", A, 8)
     ledger.note("key", B, 1)
     ledger.flush()
-    assert (ledger.flushed, ledger.boots, ledger.first) == ({"key": 1}, {"key": B}, {"key": 0})
+    assert (ledger.flushed, ledger.boot("key"), ledger.first("key")) == ({"key": 1}, B, 0)
+
+
+def test_what_is_told_between_two_flushes_belongs_to_the_boot_that_was_flushed() -> None:
+    ledger = Ledger()
+    ledger.note("key", A, 7)
+    ledger.flush()
+    ledger.note("key", B, 2)
+    assert (ledger.flushed, ledger.boot("key"), ledger.first("key")) == ({"key": 7}, A, 7)
+    ledger.flush()
+    assert (ledger.flushed, ledger.boot("key"), ledger.first("key")) == ({"key": 2}, B, 2)

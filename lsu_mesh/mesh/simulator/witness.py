@@ -152,10 +152,10 @@ class Witness:
         self._stored.update(stored[self._stored_count :])
         self._stored_count = len(stored)
         for key, seq in node.ledger.flushed.items():
-            boot = node.ledger.boots[key]
+            boot = node.ledger.boot(key)
             topic, name = key.split("/")
             src = f"{self._provenance.role_of(topic, name)}/{name}"
-            first = node.ledger.first[key]
+            first = node.ledger.first(key)
             for number in range(max(first, self._looked.get((node.boot, key, boot), 0)), seq + 1):
                 if (topic, src, boot, number) not in self._stored and not node.ledger.is_lost(key, number):
                     raise InvariantBroken("recording", f"{key} is said to be flushed to {seq}, {number} is not stored")

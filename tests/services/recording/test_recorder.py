@@ -19,13 +19,14 @@ import pytest
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
-from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.messages import Event, Fused, Health, Measurement, Posterior, Prediction, Rejection, Truth
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from services.recording.body import Body, body
 from services.recording.made_up_mesh import START_NS, STEP_NS, Arrival, MadeUpMesh, written
+from services.recording.mend import mend
 from services.recording.read import read_raw
 from services.recording.recorder import Recorder
 from services.recording.stream import next_part
@@ -55,9 +56,29 @@ def messages(arrivals: Sequence[Arrival], kind: type, name: str = "") -> list[An
     return [a.message for a in arrivals if type(a.message) is kind and name in ("", a.message.name)]
 
 
+def has_index(path: Path) -> bool:
+    """Whether the file ends with an index of its chunks: Rerun warns where it has to make one."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        RrdReader(path).stream().to_chunks()
+    return not any("no footer" in str(warning.message) for warning in caught)
+
+
 @pytest.fixture
 def arrivals(configuration: Configuration) -> list[Arrival]:
     return MadeUpMesh(configuration).run(60)
+
+
+@pytest.mark.parametrize(("override", "is_short"), [("mesh.steps=15000", True), ("mesh.steps=15001", False)])
+def test_only_short_runs_have_an_index_which_grows_in_memory_till_their_end(
+    configuration: Configuration, arrivals: list[Arrival], record: Record, override: str, is_short: bool
+) -> None:
+    path = record(load(configuration.path, [override]), arrivals)
+    assert has_index(path) is is_short
+    assert [message.payload for message in read_raw(path)] == [arrival.payload for arrival in arrivals]
+    mend([path], path)
+    assert has_index(path)
+    assert [message.payload for message in read_raw(path)] == [arrival.payload for arrival in arrivals]
 
 
 def test_truth_bands_and_errors_are_the_numbers_of_the_messages(
