@@ -38,12 +38,14 @@ class Recomputation:
         """A filter has taken a message."""
         if node.name not in self._watched or not isinstance(node, FilterNode):
             return
+        current = node.current
+        if current is not None and message.step < current - node.history:
+            return  # too late: the node takes no notice of it either
         if isinstance(message, Input):
             self._inputs.setdefault((node.boot, message.step), message)
         elif isinstance(message, Measurement):
             self._measured.setdefault((node.boot, message.step), {}).setdefault(message.name, message)
-            current = node.current
-            if current is not None and current - node.history <= message.step <= current:
+            if current is not None and message.step <= current:
                 self._late.setdefault(node.boot, set()).add(message.step)
 
     def check(self, node: Node, newest: dict[int, Posterior]) -> None:
