@@ -462,7 +462,7 @@ class Estimator(Node):
             step.before = None
 
     def rehearse(self) -> None:
-        rehearse(self.engine)
+        rehearse(self.engine, self.configuration.input_box)
 
     # -- what is said of the node
 

@@ -5,20 +5,33 @@ from __future__ import annotations
 import numpy as np
 
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.sets import to_message
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.parallelotope import Parallelotope
 
 REHEARSED_STEPS = 6
 """So many steps bring a limited complexity into play."""
 
 
-def rehearse(engine: Filter) -> None:
+def rehearse(engine: Filter, input_box: Orthotope | None) -> None:
     """Do everything that a node asks of its filter; the filter is left as it was."""
     before, model = engine.snapshot(), engine.model
-    for _ in range(REHEARSED_STEPS):
+    reach = Reach(model)
+    reach.begin(engine.support.interval_hull())
+    for number in range(REHEARSED_STEPS):
         if model.output_count:
             engine.update(engine.predict_output().point)
-        engine.condition(engine.support.interval_hull())
+        hull = engine.support.interval_hull()
+        around = Parallelotope(hull.center, np.diag(np.maximum(hull.half_widths, 1.0)))
+        for other in (around, hull, engine.support):
+            engine.condition(other)
+            if number % 3 == 2:
+                engine.reset(other)
         to_message(engine.support)
         engine.bounds()
-        engine.predict(np.zeros(model.input_count) if model.input_count else None)
+        zeros = np.zeros(model.input_count) if model.input_count else None
+        u = input_box if number % 2 and model.input_count else None
+        engine.predict(zeros if u is None else u)
+        reach.predict(zeros if u is None else u)
     engine.restore(before)
