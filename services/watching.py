@@ -15,10 +15,9 @@ from lsu_mesh.mesh.keys import key, parse
 from lsu_mesh.mesh.messages import TYPES, Message
 from lsu_mesh.mesh.nodes.node import SECOND
 from services.addresses import Addresses, WrongAddress
-from services.bus import Bus, Clock, NoSession
-from services.cli import COULD_NOT_START, NOT_MET, USAGE
-from services.commands.configuration import load_or_explain, session_settings
-from services.security import InsecureSession
+from services.bus import Bus, Clock
+from services.cli import NOT_MET, USAGE
+from services.commands.configuration import load_or_explain, session_settings, with_session
 from services.stop import Stop
 
 LINK_S = 3.0
@@ -113,13 +112,10 @@ def run_tool(options: argparse.Namespace, work: Callable[[Configuration, argpars
     if configuration is None:
         return USAGE
     try:
-        return work(configuration, options)
+        return with_session(options.command, lambda: work(configuration, options))
     except WrongAddress as error:
         print(f"{configuration.path}: {error}", file=sys.stderr)
         return USAGE
     except NobodyThere as error:
         print(error, file=sys.stderr)
         return NOT_MET
-    except (NoSession, InsecureSession) as error:
-        print(error, file=sys.stderr)
-        return COULD_NOT_START

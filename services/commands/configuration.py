@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load
 from lsu_mesh.mesh.keys import READER
-from services.bus import SessionSettings
-from services.security import certificates, check_endpoints
+from services.bus import NoSession, SessionSettings
+from services.cli import COULD_NOT_START, USAGE
+from services.security import InsecureSession, certificates, check_endpoints
 
 DEMO = Path(__file__).resolve().parent.parent / "demo.toml"
 
@@ -70,6 +72,18 @@ def session_settings(configuration: Configuration, options: argparse.Namespace) 
         zenoh=tuple(options.cfg),
         certificates=certificates(configuration, name),
     )
+
+
+def with_session(who: str, work: Callable[[], int]) -> int:
+    """The exit code of ``work``; a session that must not or cannot be opened is explained on stderr."""
+    try:
+        return work()
+    except InsecureSession as error:
+        print(f"{who}: {error}", file=sys.stderr)
+        return USAGE
+    except NoSession as error:
+        print(error, file=sys.stderr)
+        return COULD_NOT_START
 
 
 def any_port(configuration: Configuration) -> str:

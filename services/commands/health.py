@@ -14,10 +14,9 @@ from lsu_mesh.mesh.messages import Health
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
 from services.arrivals import Arrival
-from services.bus import Bus, Clock, NoSession
-from services.cli import COULD_NOT_START, NOT_MET, OK, USAGE
-from services.commands.configuration import load_or_explain, session_settings
-from services.security import InsecureSession
+from services.bus import Bus, Clock
+from services.cli import NOT_MET, OK, USAGE
+from services.commands.configuration import load_or_explain, session_settings, with_session
 
 SHOWN = ("received", "gaps", "duplicates", "dropped", "late", "rewinds", "contradictions", "behind", "queue", "step_ms")
 """Counters with a column of their own; refusals are summed, and told by reason below the table."""
@@ -28,11 +27,11 @@ def main(options: argparse.Namespace) -> int:
     configuration = load_or_explain(options.config, options)
     if configuration is None:
         return USAGE
-    try:
-        peers = _listen(configuration, options)
-    except (NoSession, InsecureSession) as error:
-        print(error, file=sys.stderr)
-        return COULD_NOT_START
+    return with_session("health", lambda: _tell(configuration, options))
+
+
+def _tell(configuration: Configuration, options: argparse.Namespace) -> int:
+    peers = _listen(configuration, options)
     print_json(peers) if options.json else print_table(peers)
     return OK if worst([peer.level for peer in peers]) == "OK" else NOT_MET
 

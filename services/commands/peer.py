@@ -12,10 +12,8 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.table import nearest
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from services.bus import NoSession
-from services.cli import COULD_NOT_START, USAGE
-from services.commands.configuration import load_or_explain, session_settings
-from services.security import InsecureSession
+from services.cli import USAGE
+from services.commands.configuration import load_or_explain, session_settings, with_session
 
 
 def main(options: argparse.Namespace) -> int:
@@ -29,14 +27,7 @@ def main(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return USAGE
-    try:
-        return _run(configuration, options)
-    except InsecureSession as error:
-        print(f"{options.role} {options.name}: {error}", file=sys.stderr)
-        return USAGE
-    except NoSession as error:
-        print(error, file=sys.stderr)
-        return COULD_NOT_START
+    return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
 
 
 def _run(configuration: Configuration, options: argparse.Namespace) -> int:

@@ -7,28 +7,23 @@ import sys
 import time
 
 from lsu_mesh.mesh.keys import ROUTER
-from services.bus import Bus, Clock, NoSession, SessionSettings
-from services.cli import COULD_NOT_START, OK, USAGE
-from services.commands.configuration import load_or_explain
+from services.bus import Bus, Clock, SessionSettings
+from services.cli import OK, USAGE
+from services.commands.configuration import load_or_explain, with_session
 from services.peer import LONGEST_WAIT
-from services.security import InsecureSession, certificates, check_endpoints
+from services.security import certificates, check_endpoints
 from services.stop import Stop
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
 
 
 def main(options: argparse.Namespace) -> int:
-    try:
-        settings = _settings(options)
-        if settings is None:
-            return USAGE
-        return _route(settings, options.stop)
-    except InsecureSession as error:
-        print(f"router: {error}", file=sys.stderr)
-        return USAGE
-    except NoSession as error:
-        print(error, file=sys.stderr)
-        return COULD_NOT_START
+    return with_session("router", lambda: _main(options))
+
+
+def _main(options: argparse.Namespace) -> int:
+    settings = _settings(options)
+    return USAGE if settings is None else _route(settings, options.stop)
 
 
 def _settings(options: argparse.Namespace) -> SessionSettings | None:

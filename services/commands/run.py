@@ -14,11 +14,11 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh.mesh.playback import read_playback
 from services.arrivals import Arrival
-from services.bus import Bus, Clock, NoSession, SessionSettings
+from services.bus import Bus, Clock, SessionSettings
 from services.cli import COULD_NOT_START, FAILURE, OK, USAGE
-from services.commands.configuration import DEMO, any_port, flags, load_or_explain, print_warnings
+from services.commands.configuration import DEMO, any_port, flags, load_or_explain, print_warnings, with_session
 from services.report import RunReport
-from services.security import InsecureSession, certificates, check_endpoints
+from services.security import certificates, check_endpoints
 from services.stop import Stop
 from services.supervisor import Supervisor
 from services.table import Progress, print_json, print_table
@@ -120,22 +120,19 @@ def main(options: argparse.Namespace) -> int:
 
 def run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None = None) -> int:
     """Run the mesh of a configuration, with a recording in the place of its sources where there is one."""
+    return with_session("run", lambda: _run_mesh(configuration, options, player))
+
+
+def _run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None) -> int:
     stop: Stop = options.stop
     clock = Clock()
-    try:
-        settings = _session_settings(configuration, options)
-        with Bus(settings, clock) as bus:
-            recording = None if options.no_record else _recording_path(configuration, options)
-            supervisor = Supervisor(configuration.supervisor)
-            report = RunReport(configuration)
-            run = Run(configuration, options, supervisor, bus, clock, stop, report, recording, player)
-            return _supervise(run)
-    except InsecureSession as error:
-        print(f"run: {error}", file=sys.stderr)
-        return USAGE
-    except NoSession as error:
-        print(error, file=sys.stderr)
-        return COULD_NOT_START
+    settings = _session_settings(configuration, options)
+    with Bus(settings, clock) as bus:
+        recording = None if options.no_record else _recording_path(configuration, options)
+        supervisor = Supervisor(configuration.supervisor)
+        report = RunReport(configuration)
+        run = Run(configuration, options, supervisor, bus, clock, stop, report, recording, player)
+        return _supervise(run)
 
 
 def _session_settings(configuration: Configuration, options: argparse.Namespace) -> SessionSettings:

@@ -26,7 +26,7 @@ def test_a_run_in_which_a_filter_and_the_recorder_are_killed_is_exact(start_run,
     session.child("recorder recorder").kill()
     session.child("filter box").kill()
     everyone = ("fused/main", "posterior/box", "posterior/para", "posterior/cz")
-    until(lambda: min(count(second, ending) for ending in everyone) >= 50)
+    until(lambda: min(count(second, ending) for ending in everyone) >= 80)
     until(lambda: boots_of(second, "filter/box") - boots_of(first, "filter/box"))
     session.process.send_signal(signal.SIGINT)
     assert session.wait() == 0, session.output[1]
@@ -35,7 +35,7 @@ def test_a_run_in_which_a_filter_and_the_recorder_are_killed_is_exact(start_run,
     assert verification.wait(200) == 0, verification.output
     (summary,) = verification.of("verification")
     assert summary["different"] == summary["miss_truth"] == 0
-    assert summary["exact"] >= 7 * 50, "of four estimators, three of which publish two sets a step"
+    assert summary["exact"] >= 7 * 70, "of four estimators, three of which publish two sets a step"
 
 
 def until(holds: Callable[[], object], timeout: float = 120) -> None:
