@@ -14,7 +14,9 @@ SECOND_NS = 1_000_000_000
 MOST_TRIES = 5
 """Then the messages have left the publisher's cache, or the publisher is gone."""
 LONG_QUEUE = 1024
-"""So much waits to be taken, and what is missing may be in there; more questions would only add to it."""
+"""So much waits to be taken, and what is missing may be in there; questions add to it, so that fewer are asked."""
+PATIENCE_NS = 2 * SECOND_NS
+"""Between two looks then; after two of them publishers still have what is missing (``CACHED_SECONDS``)."""
 
 
 class Recovery:
@@ -33,8 +35,9 @@ class Recovery:
         """Questions so far."""
 
     def look(self, now: int, waiting: int = 0) -> None:
-        """Do what is due, unless so many messages wait to be taken that the peer has enough to do."""
-        if now < self._next or waiting > LONG_QUEUE:
+        """Do what is due, less often where so many messages wait to be taken that the peer has enough to do."""
+        patience = PATIENCE_NS - SECOND_NS if waiting > LONG_QUEUE else 0
+        if now < self._next + patience:
             return
         self._next = now + SECOND_NS
         gaps = self._gate.gaps_by_key()

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from lsu_mesh.mesh.config import Configuration, load
+from lsu_mesh.mesh.config.settings import CACHED_SECONDS
 from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import VERSION, Input, encode, encoding
@@ -67,15 +68,17 @@ def test_a_gap_that_closes_is_asked_for_no_more(gate: Gate, configuration: Confi
     assert (gate.gaps, gate.gaps_by_key()) == (0, {})
 
 
-def test_a_peer_that_has_more_than_enough_to_do_asks_for_nothing(gate: Gate) -> None:
-    asked: list[str] = []
-    recovery = Recovery(gate, asked.append)
-    for second in range(10):
+def test_a_peer_that_has_more_than_enough_to_do_asks_half_as_often_and_while_publishers_remember(gate: Gate) -> None:
+    asked: list[int] = []
+    second = 0
+    recovery = Recovery(gate, lambda _: asked.append(second))
+    for second in range(7):
         recovery.look(second * SECOND_NS, waiting=5000)
-    assert asked == []
-    for second in range(10, 12):
+    assert asked == [3, 5], "it looks at 1, 3 and 5"
+    assert asked[0] < CACHED_SECONDS
+    for second in (7, 8):
         recovery.look(second * SECOND_NS, waiting=10)
-    assert asked == [INPUT], "later it does"
+    assert asked == [3, 5, 7, 8]
 
 
 def test_while_messages_come_the_rest_is_waited_for(gate: Gate, configuration: Configuration) -> None:
