@@ -11,16 +11,18 @@ from collections.abc import Callable
 from lsu_mesh.mesh.gate import Gate
 
 SECOND_NS = 1_000_000_000
-MOST_TRIES = 5
+LOOK_NS = SECOND_NS // 2
+"""Between two looks. After an outage of four seconds publishers keep what was missed for two more."""
+MOST_TRIES = 10
 """Then the messages have left the publisher's cache, or the publisher is gone."""
 LONG_QUEUE = 1024
 """So much waits to be taken, and what is missing may be in there; questions add to it, so that fewer are asked."""
 PATIENCE_NS = 2 * SECOND_NS
-"""Between two looks then; after two of them publishers still have what is missing (``CACHED_SECONDS``)."""
+"""Between two looks then: after two of them publishers still have what is missing (``CACHED_SECONDS``)."""
 
 
 class Recovery:
-    """Once a second, asks for the keys whose gaps have not changed since the second before.
+    """Asks, at each look, for the keys whose gaps have not changed since the look before.
 
     ``ask`` gets a key and brings what its publisher's cache holds; copies are dropped by the gate.
     """
@@ -28,7 +30,7 @@ class Recovery:
     def __init__(self, gate: Gate, ask: Callable[[str], None]) -> None:
         self._gate = gate
         self._ask = ask
-        self._next = 0
+        self._last = -PATIENCE_NS
         self._seen: dict[str, int] = {}
         self._tries: dict[str, int] = {}
         self.asked = 0
@@ -36,10 +38,10 @@ class Recovery:
 
     def look(self, now: int, waiting: int = 0) -> None:
         """Do what is due, less often where so many messages wait to be taken that the peer has enough to do."""
-        patience = PATIENCE_NS - SECOND_NS if waiting > LONG_QUEUE else 0
-        if now < self._next + patience:
+        pause = PATIENCE_NS if waiting > LONG_QUEUE else LOOK_NS
+        if now < self._last + pause:
             return
-        self._next = now + SECOND_NS
+        self._last = now
         gaps = self._gate.gaps_by_key()
         for key, count in gaps.items():
             if self._seen.get(key) != count:

@@ -171,8 +171,9 @@ class LSUCZ(Filter):
         body, (lower, upper) = self._held.body, self.bounds()
         if not self._limits.allow(body):
             body, lower, upper, _ = self._settled(body, lower, upper)
+        box = np.array([lower, upper])  # one compiled kernel serves, whether or not the bounds may be written
         finite, body, lower, upper = predict_constrained(
-            body, lower, upper, arrays.A, arrays.B, center, arrays.G, widths
+            body, box[0], box[1], arrays.A, arrays.B, center, arrays.G, widths
         )
         if not finite:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")

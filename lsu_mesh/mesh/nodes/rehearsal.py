@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
+from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.nodes.reach import Reach
 from lsu_mesh.mesh.sets import to_message
@@ -24,8 +27,10 @@ def rehearse(engine: Filter, input_box: Orthotope | None) -> None:
             engine.update(engine.predict_output().point)
         hull = engine.support.interval_hull()
         around = Parallelotope(hull.center, np.diag(np.maximum(hull.half_widths, 1.0)))
-        for other in (around, hull, engine.support):
-            engine.condition(other)
+        across = Parallelotope(hull.center, 0.5 * around.generators @ np.triu(np.ones_like(around.generators)))
+        for other in (around, hull, engine.support, across):
+            with suppress(InconsistentData):  # the centre of a hull need not be in the set
+                engine.condition(other)
             if number % 3 == 2:
                 engine.reset(other)
         to_message(engine.support)
