@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import shutil
 import threading
 import time
@@ -138,10 +139,12 @@ class LiveMesh:
     # -- begin and end
 
     def __enter__(self) -> Self:
+        gc.disable()  # searching all that was seen takes ever longer, and what comes meanwhile is timed wrongly
         try:
             self._begin()
         except BaseException:
             self._end()
+            gc.enable()
             raise
         return self
 
@@ -149,6 +152,7 @@ class LiveMesh:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._end()
+        gc.enable()
 
     def _begin(self) -> None:
         if self.star:
