@@ -82,6 +82,11 @@ def test_a_seed_repeats_itself(demo: Path) -> None:
     assert one.sets > STEPS
 
 
+@pytest.mark.parametrize("seed", [216, 1075, 2106])
+def test_seeds_that_a_campaign_found_stay_whole(demo: Path, seed: int) -> None:
+    assert run_seed(demo, seed, 300, FAULTS).broken == ""
+
+
 def test_no_invariant_is_broken_in_a_share_of_the_seeds(demo: Path) -> None:
     outcomes = [run_seed(demo, seed, 240, FAULTS) for seed in (1, 3)]
     assert [outcome.broken for outcome in outcomes] == ["", ""]

@@ -30,6 +30,9 @@ from lsu_mesh.mesh.simulator.recorder import RecorderSink
 FALSE_ALARMS = ("contradiction", "reset", "measurement-changed", "input-changed", "source-rejected", "quarantined")
 """Events that accuse somebody, in a mesh in which nobody lies."""
 
+NO_ACCUSATION = ("status restarted",)
+"""Reasons why a fusion leaves a sound source out: it has only just begun again."""
+
 EXACTLY = 4
 """Every so many sets the support itself is asked for the truth, in exact arithmetic; the bounds are always."""
 
@@ -135,7 +138,9 @@ class Witness:
             raise InvariantBroken("containment", f"{message.src} step {message.step}: {x} is not in the support")
 
     def _check_posterior(self, node: Node, message: Posterior) -> None:
-        if message.status == "inconsistent" or (isinstance(message, Fused) and message.rejected):
+        rejected = message.rejected if isinstance(message, Fused) else []
+        accused = [one for one in rejected if one.reason not in NO_ACCUSATION]
+        if message.status == "inconsistent" or accused:
             raise InvariantBroken("false alarm", f"{message.src} step {message.step}: {message.cause or message}")
         life = self._lives[node.boot]
         expected = life.revisions.get(message.step, 0)
