@@ -166,9 +166,9 @@ class Recorder:
 
     def _put(self, store: Callable[[], None]) -> None:
         """Hand what waits to Rerun and have it written; any of its calls may hang once its file writer has ended."""
-        if self._guarded(f"looking at {self.path.parent}", self._look_at_space) and self._broken:
-            return
-        if not ends_within(HANGS_S, store):
+        if not self._broken:
+            self._guarded(f"looking at {self.path.parent}", self._look_at_space)
+        if not self._broken and not ends_within(HANGS_S, store):
             self._guarded("giving up", self._give_up)
 
     def _look_at_space(self) -> None:
@@ -211,7 +211,7 @@ class Recorder:
         self._counts[self._broken] = len(self._unflushed)
 
     def close(self) -> None:
-        """Flush, and end the file with its footer; the second call does nothing."""
+        """Flush, and end the file; the second call does nothing."""
         if self._closed:
             return
         self._closed = True

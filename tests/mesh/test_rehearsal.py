@@ -1,4 +1,4 @@
-"""After its rehearsal a peer loads no kernel any more, whatever comes."""
+"""After its rehearsal a peer loads no kernel for transfers, for starts from sets, or for its reach."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from lsu_mesh import LSUO, LSUModel, Orthotope
+from lsu_mesh.mesh.nodes.rehearsal import rehearse
 
 SCRIPT = """
 import gc
@@ -49,3 +53,11 @@ def test_nothing_is_loaded_after_the_rehearsal(name: str, demo: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "[]"
+
+
+def test_a_state_that_leaves_its_domain_in_the_rehearsal_ends_only_that() -> None:
+    model = LSUModel(A=[[2.0]], B=None, C=[[1.0]], rho=[0.1], r=[0.5], domain=Orthotope([0.0], [9.0]))
+    engine = LSUO(model, Orthotope([4.0], [5.0]))
+    before = np.array(engine.bounds())
+    rehearse(engine, None)
+    assert np.array_equal(before, engine.bounds())
