@@ -1,15 +1,17 @@
 """Breaks a real mesh in every way: ``python benchmarks/faults.py [--rate 50] [--soak MINUTES]``.
 
-Each role in turn is killed, stopped and started, frozen, and its link made slow, stalled, cut and corrupted; a
-subscriber is frozen; all are asked to stop, with their router and without it. Prints tables in Markdown and returns 1
-when a promise was broken: an estimate that does not hold the truth, a lost message, a process that did not end well,
-or, with ``--strict``, a limit on time. ``--soak`` runs the mesh for so long and watches everyone's memory instead.
+Each role in turn is killed, stopped and started, frozen, and its link reset, made slow, stalled, cut and corrupted; all
+are frozen at once; a subscriber is frozen; all are asked to stop, with their router and without it. Prints tables in
+Markdown and returns 1 when a promise was broken: an estimate that does not hold the truth, a lost message, a process
+that did not end well, or, with ``--strict``, a limit on time. ``--soak`` runs the mesh for so long and watches
+everyone's memory instead.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import signal
 import sys
 import tempfile
@@ -24,7 +26,7 @@ from live_faults import HEADER, ROLES, Ending, Outcome
 from live_mesh import LiveMesh
 from live_soak import soak
 
-PEERS_FAULTS = (live_faults.kill, live_faults.restart, live_faults.freeze)
+PEERS_FAULTS = (live_faults.kill, live_faults.restart, live_faults.freeze, live_faults.reset_link)
 STAR_FAULTS = (live_faults.delay, live_faults.stall, live_faults.cut, live_faults.corrupt)
 RESUME_S, RESUME_AFTER_FREEZE_S = 1.0, 2.0 + live_faults.LEASE_S
 STOP_S, STOP_WITHOUT_ROUTER_S = 3.0, 15.0
@@ -62,6 +64,8 @@ def _all_faults(folder: Path, overrides: Sequence[str], strict: bool, only: str)
         with LiveMesh(_new(folder / "peers"), overrides) as mesh:
             mesh.until(lambda: mesh.is_current(0), "estimates flow")
             outcomes += _each_role(mesh, PEERS_FAULTS, only)
+            if only in live_faults.ALL:
+                outcomes.append(_told(live_faults.stand_still(mesh)))
             if only in "subscriber":
                 outcomes.append(_told(live_faults.slow_subscriber(mesh)))
     if not only or only in "router link bit":
@@ -103,6 +107,9 @@ def _endings(folder: Path, overrides: Sequence[str]) -> list[Endings]:
 
 def _each_role(mesh: LiveMesh, faults: Sequence[Callable[[LiveMesh, str], Outcome]], only: str) -> list[Outcome]:
     chosen = [(fault, role) for fault in faults for role in ROLES if only in f"{fault.__name__} {role}"]
+    if shutil.which("ss") is None and live_faults.reset_link in faults:
+        print("links are not reset: there is no `ss` here (Debian: iproute2)", file=sys.stderr)
+        chosen = [(fault, role) for fault, role in chosen if fault is not live_faults.reset_link]
     return [_told(fault(mesh, role)) for fault, role in chosen]
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -18,10 +18,14 @@ import zenoh
 from zenoh import ext
 
 from services.arrivals import Arrival, Arrivals
+from services.reunion import Reunion
 from services.security import Certificates
 
 LEASE_MS = 2000
 HEARTBEAT_S = 0.1
+SETTLED_S, LONGEST_INTRODUCTION_S = 0.5, 5.0
+"""A second session leaves the mesh when its links have not changed for so long, and after so long in any case. One that
+is closed while it opens links leaves them open, for as long as its process lives."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ class Bus:
         self._arrivals = Arrivals()
         self._publishers: dict[str, Any] = {}
         self._declared: list[Any] = []
+        self._own_tokens: set[str] = set()
+        self._reunion: Reunion | None = None
         try:
             self._session = zenoh.open(_zenoh_configuration(settings))
         except zenoh.ZError as error:
@@ -116,16 +122,53 @@ class Bus:
 
     def declare_alive(self, key: str) -> None:
         """Show that this process is there, for as long as it is."""
+        self._own_tokens.add(key)
         self._declared.append(self._session.liveliness().declare_token(key))
 
     def watch_alive(self, key: str) -> None:
-        """Queue who is there and who comes and goes."""
+        """Queue who is there and who comes and goes, and look for those that only this session does not see."""
+        if self._settings.mode == "peer" and self._settings.connect and self._reunion is None:
+            self._reunion = Reunion(lambda: self._alive_elsewhere(key), self._introduce)
 
         def changed(sample: Any) -> None:
-            what = "alive" if sample.kind == zenoh.SampleKind.PUT else "gone"
-            self._arrivals.put(Arrival(what, str(sample.key_expr), b"", self._clock.now()))
+            is_there = sample.kind == zenoh.SampleKind.PUT
+            self._arrivals.put(Arrival("alive" if is_there else "gone", str(sample.key_expr), b"", self._clock.now()))
+            if self._reunion is not None:
+                self._reunion.note(str(sample.key_expr), is_there)
 
         self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
+
+    def _alive_elsewhere(self, key: str) -> set[str]:
+        """Tokens that an entry of the mesh knows, without the own ones; none when it does not answer."""
+        configuration = _zenoh_configuration(replace(self._settings, mode="client", listen=()))
+        configuration.insert_json5("connect/timeout_ms", "1000")
+        configuration.insert_json5("connect/exit_on_failure", "true")
+        try:
+            with zenoh.open(configuration) as session:
+                replies = session.liveliness().get(key, timeout=1.0)
+                return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None} - self._own_tokens
+        except zenoh.ZError:
+            return set()
+
+    def _introduce(self, is_over: Callable[[], bool]) -> None:
+        """Join the mesh once more, linked to everybody, for a moment."""
+        configuration = _zenoh_configuration(replace(self._settings, listen=()))
+        strategy = {"peer": {"to_router": "always", "to_peer": "always"}}
+        configuration.insert_json5("scouting/gossip/autoconnect_strategy", json.dumps(strategy))
+        configuration.insert_json5("connect/timeout_ms", "1000")
+        try:
+            with zenoh.open(configuration) as session:
+                begin = changed = time.monotonic()
+                links: set[str] = set()
+                while (now := time.monotonic()) < begin + LONGEST_INTRODUCTION_S:
+                    found = {str(peer) for peer in session.info.peers_zid()}
+                    if found != links:
+                        links, changed = found, now
+                    if now > changed + SETTLED_S and is_over():
+                        return
+                    time.sleep(0.05)
+        except zenoh.ZError:
+            return
 
     def ask(self, key: str) -> None:
         """Query a key; the answers are queued as samples when they come."""
@@ -177,6 +220,8 @@ class Bus:
 
     def close(self) -> None:
         """Undeclare everything and close; errors of a lost link do not matter any more."""
+        if self._reunion is not None:
+            self._reunion.close()
         for declared in [*reversed(self._declared), *self._publishers.values()]:
             try:
                 declared.undeclare()

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import psutil
 from live_mesh import ROOT, SLACK_S, LiveMesh
 
 from lsu_mesh.mesh.keys import PREFIX
@@ -18,6 +19,9 @@ from lsu_mesh.mesh.keys import PREFIX
 ROLES = {"plant": "plant", "sensor": "s2", "filter": "cz", "fusion": "main", "recorder": "recorder"}
 """One peer of each role of the demo."""
 BOTH = (signal.SIGTERM, signal.SIGINT)
+PARTNERS = {"plant": "s2", "sensor": "cz", "filter": "main", "fusion": "recorder", "recorder": "plant"}
+"""The other end of the link that is reset, by role."""
+ALL = "all at once"
 LEASE_S = 2.0
 SETTLE_S = 15.0
 """Recovery of missed messages may take so long on a loaded machine."""
@@ -100,6 +104,50 @@ def freeze(mesh: LiveMesh, role: str, seconds: float = 4.0) -> Outcome:
     )  # fmt: skip
 
 
+def stand_still(mesh: LiveMesh, seconds: float = 10.0) -> Outcome:
+    """All peers are frozen, as when a virtual machine pauses: longer than publishers keep what they sent."""
+    processes = [mesh.process(name) for _, name in mesh.peers]
+
+    def suspend() -> None:
+        for process in processes:
+            process.suspend()
+
+    def resume() -> None:
+        for process in processes:
+            process.resume()
+
+    return suffer(mesh, f"SIGSTOP {seconds:g} s", ALL, suspend, resume, seconds, name="plant")
+
+
+def reset_link(mesh: LiveMesh, role: str) -> Outcome:
+    """The connection between two peers is closed by the system; gossip alone would never bring it back.
+
+    Needs ``ss`` of iproute2 and the right to close other processes' sockets.
+    """
+    ends = mesh.process(ROLES[role]), mesh.process(PARTNERS[role])
+
+    def break_it() -> None:
+        for own, other in connections(*ends):
+            between = ["sport", "=", f":{own}", "dport", "=", f":{other}"]
+            subprocess.run(["ss", "--kill", "--tcp", *between], check=True, stdout=subprocess.DEVNULL)
+        assert not connections(*ends), "the system does not close the connection"
+
+    def repair() -> None:
+        """Nobody does: the peers have to."""
+        mesh.until(lambda: bool(connections(*ends)), f"{ROLES[role]} and {PARTNERS[role]} are linked again")
+
+    return suffer(mesh, f"link to {PARTNERS[role]} is reset", role, break_it, repair, 0.0, heals=True)
+
+
+def connections(one: psutil.Process, other: psutil.Process) -> set[tuple[int, int]]:
+    """Ports of the connections between two processes, those of the first one first."""
+    of_one, of_other = (
+        {(c.laddr.port, c.raddr.port) for c in process.net_connections("tcp") if c.status == "ESTABLISHED"}
+        for process in (one, other)
+    )
+    return {(own, far) for own, far in of_one if (far, own) in of_other}
+
+
 def stall(mesh: LiveMesh, role: str, seconds: float = 4.0) -> Outcome:
     """The link carries nothing, without a word to either end."""
     proxy = mesh.proxies[ROLES[role]]
@@ -141,9 +189,15 @@ def suffer(
     *,
     restarts: bool = False,
     tells: bool = True,
+    heals: bool = False,
+    name: str | None = None,
 ) -> Outcome:
-    """Break, watch, repair, and wait until all is well."""
-    name = ROLES[role]
+    """Break, watch, repair, and wait until all is well.
+
+    ``restarts``: times after the return count from then. ``tells``: the peer is seen to return. ``heals``: the mesh
+    repairs itself, and it is back when ``repair`` returns. ``name``: who is watched for the role.
+    """
+    name = name or ROLES[role]
     begin = mesh.clock.now()
     mesh.until(lambda: mesh.is_current(begin), "all is well before the fault")
     broken = mesh.clock.now()
@@ -152,6 +206,7 @@ def suffer(
     repaired = mesh.clock.now()
     repair()
     back = _await_return(mesh, name, broken, repaired) if tells else repaired
+    back = mesh.clock.now() if heals else back
     since = back if restarts else repaired
     mesh.until(lambda: mesh.is_current(since) and mesh.speaks(role, name, since), f"recovered from {fault} of {role}")
     recovered = mesh.clock.now()

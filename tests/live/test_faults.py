@@ -38,6 +38,12 @@ def check(outcome: Outcome) -> None:
     assert outcome.recovered < SLOWEST_S, outcome
 
 
+def test_a_machine_that_stands_still_loses_nothing(mesh: LiveMesh) -> None:
+    """For longer than publishers keep what they sent: the plant must not publish all of it before links are back."""
+    outcome = live_faults.stand_still(mesh, 1.5 * mesh.configuration.cached / mesh.configuration.mesh.rate)
+    check(outcome)
+
+
 @pytest.mark.parametrize("role", ["plant", "sensor"])
 def test_a_killed_peer_comes_back_and_nothing_is_lost(mesh: LiveMesh, role: str) -> None:
     outcome = live_faults.kill(mesh, role, down=0.3)

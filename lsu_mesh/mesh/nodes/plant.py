@@ -11,6 +11,7 @@ from lsu_mesh.mesh.access import PUBLISHES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Input, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.nodes.pace import Pace
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.mesh.playback import read_playback
 from lsu_mesh.simulation import input_at, next_state, random_uniform
@@ -40,6 +41,7 @@ class PlantNode(Node):
         assert configuration.plant is not None
         self._settings = configuration.plant
         self._schedule = schedule
+        self._pace = Pace(configuration.mesh.rate, configuration.cached)
         self._model = configuration.base_model
         self._last = configuration.mesh.steps
         self._next = 1
@@ -76,11 +78,12 @@ class PlantNode(Node):
             self._past = self._past_before(due)
         if self._next < self._past.stop:
             return self._catch_up(self._past, now)
+        first, end = self._next, min(due + 1, self._next + MOST_AT_ONCE, self._next + self._pace.allowed(now))
         messages: list[Message] = []
-        while self._next <= due and len(messages) < 2 * MOST_AT_ONCE:
-            k = self._next
+        for k in range(first, end):
             messages.append(Truth(**self.stamp("truth", k, now), x=self._x.tolist()))
             messages += self._drive(k, now, publish=True)
+        self._pace.spend(self._next - first)
         return messages
 
     def _past_before(self, due: int) -> range:
@@ -122,7 +125,7 @@ class PlantNode(Node):
 
     def wakeup(self) -> int | None:
         due = None if self.finished else self._schedule.time_of(self._next)
-        return None if due is None else max(due, self._not_before)
+        return None if due is None else max(due, self._not_before, self._pace.ready_at())
 
     @property
     def finished(self) -> bool:

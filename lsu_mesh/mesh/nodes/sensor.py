@@ -11,6 +11,7 @@ from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration, SensorFault
 from lsu_mesh.mesh.messages import Measurement, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.nodes.pace import Pace
 from lsu_mesh.mesh.nodes.plant import MOST_AT_ONCE
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.mesh.playback import read_playback
@@ -80,6 +81,7 @@ class FileSensorNode(Node):
     """Plays recorded measurements by their steps; a step between the first and the last without a row is missing.
 
     An empty cell is a missing output. Rows that share a step with an earlier row are left out and named in an event.
+    A sensor that starts late begins with what it would still keep for others, and does not catch up all at once.
     """
 
     role = "sensor"
@@ -100,6 +102,10 @@ class FileSensorNode(Node):
         if mesh.steps is not None:
             self._last = min(self._last, mesh.steps)
         self._told_collisions = False
+        self._kept = configuration.cached
+        self._pace = Pace(mesh.rate, self._kept)
+        self._has_begun = False
+        """Whether a step has been due."""
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return ()
@@ -118,7 +124,11 @@ class FileSensorNode(Node):
             about: dict[str, str | int | float | None] = {"sensor": self.name, "rows": self._played.collisions}
             messages.append(self.event("WARN", "rows-share-a-step", text, now, self._next, about))
         due = min(self._schedule.due(now), self._last)
-        end = min(due, self._next + MOST_AT_ONCE - 1)
+        if not self._has_begun and due:
+            self._has_begun = True
+            self._next = max(self._next, due - self._kept + 1)  # what came before would be too late for everybody
+        end = min(due, self._next + min(MOST_AT_ONCE, self._pace.allowed(now)) - 1)
+        self._pace.spend(max(0, end + 1 - self._next))
         while self._next <= end:
             messages.append(self._measurement(self._next, now))
             self._next += 1
@@ -134,7 +144,8 @@ class FileSensorNode(Node):
         return Measurement(**self.stamp("measurement", k, now), y=y, time_ns=time_ns)
 
     def wakeup(self) -> int | None:
-        return None if self.finished else self._schedule.time_of(self._next)
+        due = None if self.finished else self._schedule.time_of(self._next)
+        return None if due is None else max(due, self._pace.ready_at())
 
     @property
     def finished(self) -> bool:
