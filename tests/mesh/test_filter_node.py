@@ -268,3 +268,23 @@ def test_a_filter_that_starts_late_may_start_from_the_domain(mesh_of: MakeMesh) 
     truth = mesh.truth()
     for p in posteriors:
         assert all(low <= x <= high for low, x, high in zip(p.lower, truth[p.step], p.upper, strict=True))
+
+
+def test_data_of_a_step_before_the_start_do_not_hide_late_data_of_a_step_after_it(mesh_of: MakeMesh) -> None:
+    early, late = 100, 170
+    postman = Postman(lambda sensor, k: sensor == "s2" and k == late)
+    mesh = mesh_of("mesh.steps=200", "filters.box.history=128", carry=postman)
+    mesh.run(1.0)
+    mesh.kill("box")
+    mesh.run(1.4)
+    node = mesh.start("filter", "box")
+    mesh.run(2.0)
+    again = [p for p in mesh.posteriors("box") if p.boot == node.boot]
+    assert early < again[0].step < late, "one it cannot do again, the other it has to"
+    assert mesh.newest("box")[late].missing == ["s2"]
+    measured = {m.step: m for m in mesh.of(Measurement, "s2")}
+    for m in (measured[early], measured[late]):
+        mesh.publish(node, node.deliver(key("demo", "measurement", "s2"), encode(m), mesh.now))
+    mesh.turn()
+    assert mesh.newest("box")[late].missing == []
+    assert mesh.newest("box")[late].revision == 1

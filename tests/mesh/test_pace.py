@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from lsu_mesh.mesh.config import load
-from lsu_mesh.mesh.messages import Truth
+from lsu_mesh.mesh.messages import Measurement, Truth
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.pace import HURRY, SETTLING_NS, Pace
 from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.nodes.sensor import FileSensorNode
 
 RATE, KEPT = 50.0, 300
 BACK_S = 1.5
@@ -89,3 +90,25 @@ def test_a_plant_whose_machine_stood_still_publishes_every_step_but_not_at_once(
     assert steps == list(range(1, steps[-1] + 1))
     assert at_once <= configuration.cached
     assert now < 17 * SECOND
+
+
+def test_a_sensor_that_plays_a_file_and_starts_late_begins_with_what_it_would_still_keep(
+    demo: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "s1.csv").write_text("step,y\n" + "".join(f"{k},{k}.5\n" for k in range(1, 2001)))
+    text = demo.read_text().replace("C = [[1.0, 0.0, 0.5]]", 'C = [[1.0, 0.0, 0.5]]\nfile = "s1.csv"', 1)
+    (tmp_path / "mesh.toml").write_text(text)
+    configuration = load(tmp_path / "mesh.toml", (f"mesh.rate={RATE}", "mesh.steps=2000"))
+    node = FileSensorNode(configuration, "s1", "0" * 16, Schedule(0, RATE))
+    assert next(m for m in node.tick(0) if isinstance(m, Measurement)).step == 1, "in time it begins at the begin"
+    late = FileSensorNode(configuration, "s1", "1" * 16, Schedule(0, RATE))
+    now, due, out = 20 * SECOND, 1001, []
+    for _ in range(1000):
+        out += [m for m in late.tick(now) if isinstance(m, Measurement)]
+        wakeup = late.wakeup()
+        assert wakeup is not None
+        now = max(wakeup, now + 500_000)
+    assert [m.step for m in out[:3]] == [due - configuration.cached + k for k in (1, 2, 3)]
+    assert [m.step for m in out] == list(range(out[0].step, out[-1].step + 1))
+    assert [m.y for m in out] == [[m.step + 0.5] for m in out]
+    assert out[-1].step >= now * RATE / SECOND - 1, "it catches up"

@@ -82,7 +82,7 @@ def test_a_seed_repeats_itself(demo: Path) -> None:
     assert one.sets > STEPS
 
 
-@pytest.mark.parametrize("seed", [216, 1075, 2106])
+@pytest.mark.parametrize("seed", [216, 1075, 2106, 6606])
 def test_seeds_that_a_campaign_found_stay_whole(demo: Path, seed: int) -> None:
     assert run_seed(demo, seed, 300, FAULTS).broken == ""
 

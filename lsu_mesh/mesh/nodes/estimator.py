@@ -145,7 +145,12 @@ class Estimator(Node):
         step.arrived[source] = message
         if self.current is not None and self._is_over(message.step):
             self._counts["late"] += 1
-            self._dirty = message.step if self._dirty is None else min(self._dirty, message.step)
+            self._do_again(message.step, step)
+
+    def _do_again(self, k: int, step: Step) -> None:
+        """Mark a step that is over; one from before the start was never done, and must not hide a later one."""
+        if step.before is not None:
+            self._dirty = k if self._dirty is None else min(self._dirty, k)
 
     def arrived(self, k: int, source: str) -> Message | None:
         """What the source has sent for step k, as far as it is remembered."""
@@ -160,7 +165,7 @@ class Estimator(Node):
             step.input = message
             self._newest_input = max(self._newest_input, message.step)
             if self.current is not None and message.step < self.current:  # the input box stood in for it
-                self._dirty = message.step if self._dirty is None else min(self._dirty, message.step)
+                self._do_again(message.step, step)
         elif step.input.u != message.u:
             about: About = {"source": message.src, "step": message.step}
             text = f"input of step {message.step} came again from {message.src} with another value; the first counts"
