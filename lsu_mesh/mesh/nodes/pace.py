@@ -13,7 +13,7 @@ from lsu_mesh.mesh.nodes.node import SECOND
 
 SETTLING_NS = SECOND
 """Links are back after so long."""
-HURRY = 4.0
+HURRY = 5.0
 """So many times as fast as time does a late source publish then."""
 
 
