@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import statistics
+import struct
+import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,30 +14,57 @@ from pathlib import Path
 import psutil
 from live_mesh import LiveMesh, Observer, Seen, TrueStates, holds
 
+from lsu_mesh.mesh.messages import decode
+
 MIB = 2**20
 MOST_GROWTH = 0.02
 """Of a peer's memory from the third quarter of a run to the last, or ``MOST_MIB``, whichever is more."""
 MOST_MIB = 4.0
 LONGEST_LATENCIES = 200_000
+HEAD = struct.Struct("<qHI")
+"""Of each estimate in the file: arrival, lengths of key and payload."""
 
 
 class Counting(Observer):
-    """Checks each estimate as it comes and keeps none."""
+    """Writes estimates to a file as they come, and checks them when the run is over: the mesh needs the processors."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         self.truth = TrueStates(self.configuration)
         self.count = self.inside = 0
-        self.newest_estimate: dict[str, tuple[int, int]] = {}
-        """Arrival and step of the newest of each estimator; the arrival is stamped before it waits here."""
+        self._newest_payload: dict[str, tuple[int, str, bytes]] = {}
         self.latencies_ms: list[float] = []
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the observer lives
+
+    def take(self, what: str, address: str, payload: bytes, arrival_ns: int) -> None:
+        _, _, _, topic, name = address.split("/")
+        if what != "sample" or topic not in ("posterior", "fused"):
+            super().take(what, address, payload, arrival_ns)
+            return
+        self._newest_payload[name] = arrival_ns, address, payload
+        key = address.encode()
+        self._file.write(HEAD.pack(arrival_ns, len(key), len(payload)) + key + payload)
+
+    def newest_estimates(self) -> dict[str, tuple[int, int]]:
+        """Arrival and step of the latest of each estimator."""
+        newest = dict(self._newest_payload)
+        return {
+            name: (at, decode(address.split("/")[3], payload).step) for name, (at, address, payload) in newest.items()
+        }
+
+    def check(self) -> None:
+        """Take all that was written."""
+        self._file.seek(0)
+        while head := self._file.read(HEAD.size):
+            arrival_ns, of_key, of_payload = HEAD.unpack(head)
+            address = self._file.read(of_key).decode()
+            super().take("sample", address, self._file.read(of_payload), arrival_ns)
+        self._file.close()
 
     def note(self, seen: Seen) -> None:
         message = seen.message
         self.count += 1
         self.inside += holds(message, self.truth[message.step])
-        if message.step > self.newest_estimate.get(message.name, (0, 0))[1]:
-            self.newest_estimate[message.name] = seen.arrival_ns, message.step
         is_first = message.topic == "fused" and message.revision == 0
         if is_first and message.used and len(self.latencies_ms) < LONGEST_LATENCIES:
             self.latencies_ms.append((seen.arrival_ns - message.origin_ns) * 1e-6)
@@ -117,7 +146,7 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
     with LiveMesh(folder, overrides, topics=topics, observer=Counting) as mesh:
         observer = mesh.observer
         assert isinstance(observer, Counting)
-        mesh.until(lambda: len(observer.newest_estimate) == len(mesh.estimators()), "estimates flow")
+        mesh.until(lambda: len(observer.newest_estimates()) == len(mesh.estimators()), "estimates flow")
         processes = {name: mesh.process(name) for _, name in mesh.peers}
         memory: dict[str, list[float]] = {name: [] for name in processes}
         began, load, used = time.monotonic(), os.getloadavg()[0], _processor_seconds(processes)
@@ -127,9 +156,8 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
             time.sleep(min(1.0, seconds / 40))
         took, now_used = time.monotonic() - began, _processor_seconds(processes)
         cores = {name: (now_used[name] - used[name]) / took for name in processes}
-        lag = max(mesh.due(arrival_ns) - step for arrival_ns, step in observer.newest_estimate.values())
+        lag = max(mesh.due(arrival_ns) - step for arrival_ns, step in observer.newest_estimates().values())
         behind = sum(health[-1][1].counters.get("behind", 0.0) for health in observer.health.values())
-        cuts = statistics.quantiles(observer.latencies_ms, n=100)
         mesh.process("plant").terminate()  # then what is under way comes to an end
         plant = mesh.child("plant").process
         assert plant is not None
@@ -138,12 +166,14 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
         mesh.until(
             lambda: all(h[-1][0] > since for n, h in observer.health.items() if n != "plant"), "a last word", 120
         )
-        lost = mesh.gaps()
-        rate = mesh.configuration.mesh.rate
-        return Report(
-            seconds, rate, observer.count, observer.inside, lost, behind, lag, cuts[49], cuts[98], memory, cores,
-            (load, os.getloadavg()[0]),
-        )  # fmt: skip
+        lost, loads = mesh.gaps(), (load, os.getloadavg()[0])
+    observer.check()
+    lost["observer"] = float(observer.gate.gaps)
+    cuts = statistics.quantiles(observer.latencies_ms, n=100)
+    return Report(
+        seconds, mesh.configuration.mesh.rate, observer.count, observer.inside, lost, behind, lag, cuts[49], cuts[98],
+        memory, cores, loads,
+    )  # fmt: skip
 
 
 def _processor_seconds(processes: Mapping[str, psutil.Process]) -> dict[str, float]:

@@ -138,9 +138,8 @@ def _print(
     old, new = RunReport(recording.configuration), RunReport(replayed)
     for one in recording.received:
         old.note(one.message, one.arrival_ns)
-        if isinstance(one.message, SOURCES):
-            new.note(one.message, one.arrival_ns)
-    for now, message in made:
+    sources = [(one.arrival_ns, one.message) for one in recording.received if isinstance(one.message, SOURCES)]
+    for now, message in sorted([*sources, *made], key=lambda timed: timed[0]):
         new.note(message, now)
     rows = [("recorded", row) for row in old.rows()] + [("replayed", row) for row in new.rows()]
     run = max((row.last_step for _, row in rows), default=0) / recording.configuration.mesh.rate

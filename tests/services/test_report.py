@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import random
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Bounds, Message, OrthotopeMessage, Posterior, Truth, encode
-from services.report import Row, RunReport
+from services.report import Row, RunReport, Sample
 
 
 class Story:
@@ -89,3 +92,41 @@ def test_without_truth_there_is_no_error_and_no_share(story: Story) -> None:
     assert row.rmse is None
     assert row.inside is None
     assert row.width == 3.0
+
+
+def test_a_long_run_is_summed_up_as_a_short_one_is_and_keeps_little(
+    demo: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def told(story: Story) -> Row:
+        draw = random.Random(5)
+        for k in range(1, 201):
+            story.truth(k, [draw.uniform(-1, 1), 0.0, 0.0])
+            status = "inconsistent" if k % 7 == 0 else "ok"
+            low, high = sorted((draw.uniform(-1, 0.2), draw.uniform(0.1, 1)))
+            story.posterior(k, low, high, arrival_ns=draw.randrange(10**9), status=status)
+            if k % 5 == 0:
+                story.posterior(k - 3, -2.0, 2.0, revision=1)
+        return story.row()
+
+    whole = Story(demo)
+    expected = told(whole)
+    assert expected.inside is not None
+    assert 0.1 < expected.inside < 0.9
+    monkeypatch.setattr("services.report.KEPT_STEPS", 8)
+    monkeypatch.setattr("services.report.KEPT_TRUTHS", 16)
+    short = Story(demo)
+    row = told(short)
+    for name, value in asdict(expected).items():
+        assert getattr(row, name) == pytest.approx(value), name
+    track = short.report.tracks["box"]
+    assert len(track.told) == 8
+    assert len(track.outside) + len(track.inconsistent) <= 16
+
+
+def test_latencies_beyond_the_limit_are_a_fair_sample() -> None:
+    sample = Sample(most=500)
+    for number in range(20_000):
+        sample.add(float(number))
+    assert len(sample.numbers) == 500
+    assert len(set(sample.numbers)) == 500
+    assert np.mean(sample.numbers) == pytest.approx(10_000, rel=0.1)
