@@ -138,8 +138,10 @@ class Bus:
 
         self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
 
-    def _alive_elsewhere(self, key: str) -> set[str]:
-        """Tokens that an entry of the mesh knows, without the own ones; none when it does not answer."""
+    def _alive_elsewhere(self, key: str) -> set[str] | None:
+        """Tokens that an entry of the mesh knows, without the own ones; None where it may not tell of others'."""
+        if self._settings.certificates is not None and self._settings.certificates.access_control is not None:
+            return None
         configuration = _zenoh_configuration(replace(self._settings, mode="client", listen=()))
         configuration.insert_json5("connect/timeout_ms", "1000")
         configuration.insert_json5("connect/exit_on_failure", "true")

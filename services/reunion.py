@@ -3,7 +3,8 @@
 Gossip tells a peer once where another one is. When the connection of two of them breaks, or the first attempt fails,
 neither tries again: each takes the other for dead while everybody else hears both. So whoever misses a peer asks an
 entry of the mesh, in a session of its own, who is there; and when the missing one is, a second session joins the mesh
-for a moment, which makes gossip tell everybody of everybody else again.
+for a moment, which makes gossip tell everybody of everybody else again. With access control an entry may not speak for
+others: then whoever is missing may be there.
 """
 
 from __future__ import annotations
@@ -56,9 +57,9 @@ class Absences:
             self._first_look = None
         return bool(late) or is_first
 
-    def missed(self, elsewhere: Collection[str], now: float) -> list[str]:
-        """Those that are there for others; who was never seen here is asked for again from now on."""
-        missed = sorted(set(elsewhere) - self._there)
+    def missed(self, elsewhere: Collection[str] | None, now: float) -> list[str]:
+        """Those that are, or may be, there for others; who was never seen here is asked for again from now on."""
+        missed = sorted(self._absent if elsewhere is None else set(elsewhere) - self._there)
         for key in missed:
             self.note(key, False, now)
         return missed
@@ -70,12 +71,15 @@ class Reunion:
     Parameters
     ----------
     ask:
-        The keys of all liveliness tokens that an entry of the mesh knows, this peer's own left out.
+        The keys of all liveliness tokens that an entry of the mesh knows, this peer's own left out; None where it may
+        not tell.
     introduce:
         Joins the mesh with one more session until what it is given returns True.
     """
 
-    def __init__(self, ask: Callable[[], Collection[str]], introduce: Callable[[Callable[[], bool]], None]) -> None:
+    def __init__(
+        self, ask: Callable[[], Collection[str] | None], introduce: Callable[[Callable[[], bool]], None]
+    ) -> None:
         self._ask, self._introduce = ask, introduce
         self._changed = threading.Condition()
         self._absences = Absences(time.monotonic())

@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 
 import psutil
 import pytest
 from ports import free_port
 
+from lsu_mesh.mesh.config import load
+from lsu_mesh.mesh.keys import READER, key
 from services.bus import Bus, Clock, SessionSettings
+from services.certificate_authority import LOOPBACK_HOSTS
+from services.commands.keys import make_files
+from services.security import Certificates, certificates
 
 pytestmark = pytest.mark.live
 
-PEERS = 4
-"""One that holds the entry, and those that find one another through it."""
+NAMES = ("main", "plant", "s1", "box")
+"""Peers that find one another through the one that holds the entry."""
 
 
 def until(met: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
@@ -28,30 +35,49 @@ def until(met: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
 
 
 @pytest.fixture
-def entry() -> str:
-    return f"tcp/127.0.0.1:{free_port()}"
+def port() -> int:
+    return free_port()
 
 
 @pytest.fixture
-def peers(entry: str) -> Iterator[Sequence[Bus]]:
+def peers(port: int) -> Iterator[Sequence[Bus]]:
+    with joined(f"tcp/127.0.0.1:{port}", "tcp/127.0.0.1:0", lambda name: None) as buses:
+        yield buses
+
+
+@pytest.fixture
+def secured_peers(port: int, demo: Path, tmp_path: Path) -> Iterator[Sequence[Bus]]:
+    """With a certificate each, and access control: here an entry may not tell who is there."""
+    entry = f"tls/127.0.0.1:{port}"
+    file = Path(shutil.copy(demo, tmp_path / "mesh.toml"))
+    configuration = load(file, ("network.tls.enabled=true", f"network.entry={entry}"))
+    make_files(configuration, LOOPBACK_HOSTS, days=2)
+    with joined(entry, "tls/127.0.0.1:0", lambda name: certificates(configuration, name)) as buses:
+        yield buses
+
+
+@contextlib.contextmanager
+def joined(entry: str, listen: str, shows: Callable[[str], Certificates | None]) -> Iterator[Sequence[Bus]]:
     clock = Clock()
     with contextlib.ExitStack() as stack:
-        buses = [stack.enter_context(Bus(SessionSettings((), (entry,)), clock))]
-        buses += [stack.enter_context(Bus(SessionSettings((entry,)), clock)) for _ in range(PEERS - 1)]
-        for i, bus in enumerate(buses):
-            bus.declare_alive(f"test/live/{i}")
-            bus.watch_alive("test/live/*")
+        buses = [stack.enter_context(Bus(SessionSettings((), (entry,), certificates=shows(READER)), clock))]
+        for name in NAMES:
+            buses.append(
+                stack.enter_context(Bus(SessionSettings((entry,), (listen,), certificates=shows(name)), clock))
+            )
+            buses[-1].declare_alive(key("demo", "live", name))
+        for bus in buses:
+            bus.watch_alive(key("demo", "live", "*"))
         until(lambda: are_whole(buses), "everybody is linked to everybody")
         yield buses
 
 
 def are_whole(buses: Sequence[Bus]) -> bool:
-    return [bus.links() for bus in buses] == [PEERS - 1] * PEERS
+    return [bus.links() for bus in buses] == [len(NAMES)] * (len(NAMES) + 1)
 
 
-def shut_down_a_link(entry: str) -> None:
+def shut_down_a_link(port: int) -> None:
     """One connection of this process that is not one with the entry; both ends are told."""
-    port = int(entry.rpartition(":")[2])
     between = [
         connection
         for connection in psutil.Process().net_connections("tcp")
@@ -61,14 +87,18 @@ def shut_down_a_link(entry: str) -> None:
         one.shutdown(socket.SHUT_RDWR)
 
 
-def test_two_peers_whose_connection_broke_find_each_other_again(peers: Sequence[Bus], entry: str) -> None:
+@pytest.mark.parametrize("fixture", ["peers", "secured_peers"])
+def test_two_peers_whose_connection_broke_find_each_other_again(
+    fixture: str, port: int, request: pytest.FixtureRequest
+) -> None:
+    peers: Sequence[Bus] = request.getfixturevalue(fixture)
     for _ in range(2):
-        shut_down_a_link(entry)
+        shut_down_a_link(port)
         until(lambda: not are_whole(peers), "the link is gone")
         until(lambda: are_whole(peers), "the link is back, and no session too many")
 
 
-def test_what_was_published_meanwhile_arrives(peers: Sequence[Bus], entry: str) -> None:
+def test_what_was_published_meanwhile_arrives(peers: Sequence[Bus], port: int) -> None:
     for bus in peers:
         bus.subscribe("test/data/*")
     until(lambda: are_whole(peers), "all is well")
@@ -83,7 +113,7 @@ def test_what_was_published_meanwhile_arrives(peers: Sequence[Bus], entry: str) 
 
     for _ in range(25):
         publish()
-    shut_down_a_link(entry)
+    shut_down_a_link(port)
     until(lambda: not are_whole(peers), "the link is gone")
     end = time.monotonic() + 30
     while not are_whole(peers):
@@ -97,5 +127,5 @@ def test_what_was_published_meanwhile_arrives(peers: Sequence[Bus], entry: str) 
         while (arrival := bus.next(0.5)) is not None:
             if arrival.what == "sample" and arrival.key != f"test/data/{i}":
                 seen.setdefault(arrival.key, set()).add(int(arrival.payload))
-        others = {f"test/data/{j}" for j in range(PEERS) if j != i}
+        others = {f"test/data/{j}" for j in range(len(peers)) if j != i}
         assert {key: sorted(numbers) for key, numbers in seen.items()} == {key: list(range(sent)) for key in others}

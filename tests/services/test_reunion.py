@@ -63,6 +63,14 @@ def test_only_those_that_others_see_are_missed() -> None:
     assert asked_at(absences, 30.0)
 
 
+def test_where_nobody_may_tell_all_who_were_lost_may_be_there() -> None:
+    absences = Absences(begin=0.0)
+    assert absences.missed(None, 0.1) == []
+    absences.note("seen", True, 0.1)
+    absences.note("lost", False, 0.2)
+    assert absences.missed(None, 1.0) == ["lost"]
+
+
 class Mesh:
     """What an entry knows, and what an introduction does."""
 
