@@ -13,6 +13,7 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
+from lsu_mesh.mesh.nodes.silence import Silences
 from services.arrivals import Arrival
 from services.bus import Bus, Clock, SessionSettings
 from services.cli import COULD_NOT_START, FAILURE, OK
@@ -90,6 +91,9 @@ class RecorderService:
         self._queue = self._longest_ns = 0
         """The longest queue and turn since the last health message."""
         self._roles = {name: role for role, name in configuration.peers()}
+        others = [name for name in self._roles if name != ROLE_NAME]
+        self._silences = Silences(configuration, [("health", name) for name in others], others)
+        """Everybody tells its health every second; of whom nothing is heard, nothing is recorded."""
 
     def declare(self) -> None:
         """Subscribe to all topics, watch the peers, show that the recorder is there."""
@@ -140,6 +144,8 @@ class RecorderService:
             message = self._gate.admit(arrival.key, arrival.payload)
             if message is not None or self._gate.duplicates == duplicates:
                 self._recorder.record(arrival.key, arrival.payload, arrival.arrival_ns, message)
+            if isinstance(message, Health) and message.name != ROLE_NAME:
+                self._silences.heard(message.name, arrival.arrival_ns)
             return
         address = parse(arrival.key)
         if address is not None:
@@ -148,6 +154,7 @@ class RecorderService:
 
     def _tell_health(self, now: int) -> None:
         problems = list(self._recorder.problems)
+        problems += [complaint.text for complaint in self._silences.complaints(now)]
         if self._bus.dropped:
             problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
         counters = self._gate.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}
