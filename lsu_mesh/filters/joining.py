@@ -43,11 +43,16 @@ def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_gener
     if strips is not None:
         P, y, r = strips
         cuts = _cuts(bounds, other, P, y, r)
-        return (body[0], *meet_strips(*body, P, np.where(cuts, y, np.nan), r)) if cuts.any() else body
+        return _finite((body[0], *meet_strips(*body, P, np.where(cuts, y, np.nan), r)), body) if cuts.any() else body
     met = other.to_constrained_zonotope()
     if most_generators is not None and met.generator_count > most_generators:
         return joined(body, bounds, other.interval_hull(), most_generators)
-    return (body[0], *meet_sets(*body, *met.arrays))
+    return _finite((body[0], *meet_sets(*body, *met.arrays)), body)
+
+
+def _finite(met: Body, body: Body) -> Body:
+    """The intersection, or X itself, which holds it, where its numbers have outgrown double precision."""
+    return met if all(np.isfinite(part).all() for part in met) else body
 
 
 def strips_of(support: Support) -> tuple[Matrix, Vector, Vector] | None:
