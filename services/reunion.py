@@ -13,6 +13,7 @@ import random
 import threading
 import time
 from collections.abc import Callable, Collection
+from functools import partial
 
 FIRST_S, SPREAD_S = 0.3, 0.4
 """Until the first question for a lost peer, and how much longer at random: both ends of a link lose each other."""
@@ -109,7 +110,7 @@ class Reunion:
                 missed = self._absences.missed(elsewhere, time.monotonic())
             if missed and not self._is_closed:
                 self.introductions += 1
-                self._introduce(lambda missed=missed: self._is_over(missed))  # type: ignore[misc]
+                self._introduce(partial(self._is_over, missed))
 
     def _sleep(self) -> bool:
         """Until there is something to ask; False when closed."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels.constrained import meet_sets, meet_strips
 from lsu_mesh.kernels.time_update import image_of_box
+from lsu_mesh.supports.arrays import are_finite
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
@@ -52,7 +53,7 @@ def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_gener
 
 def _finite(met: Body, body: Body) -> Body:
     """The intersection, or X itself, which holds it, where its numbers have outgrown double precision."""
-    return met if all(np.isfinite(part).all() for part in met) else body
+    return met if are_finite(*met) else body
 
 
 def strips_of(support: Support) -> tuple[Matrix, Vector, Vector] | None:

@@ -15,6 +15,11 @@ MOST_EDGES = 16
 """A box with more edge directions has more than 65 536 corners: they are not enumerated."""
 
 
+def are_finite(*arrays: Array) -> bool:
+    """Whether no number has outgrown double precision."""
+    return all(bool(np.isfinite(array).all()) for array in arrays)
+
+
 def finite_array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> Array:
     """A read-only, contiguous float64 copy of ``value``; ``None`` in ``shape`` leaves that length open.
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound
 from lsu_mesh.kernels.hull import EMPTY, LOOSE, Program, maxima, open_program
+from lsu_mesh.supports.arrays import are_finite
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -60,8 +61,7 @@ def _highs(d: Vector, A: Matrix, b: Vector) -> tuple[Vector, Vector]:
     """Multipliers (m,) and a point (g,) by HiGHS; zeros where it fails, with which the bound is that of the box."""
     from scipy.optimize import linprog
 
-    is_finite = all(np.isfinite(part).all() for part in (d, A, b))
-    answer = linprog(-d, A_eq=A, b_eq=b, bounds=(-1, 1), method="highs") if is_finite else None
+    answer = linprog(-d, A_eq=A, b_eq=b, bounds=(-1, 1), method="highs") if are_finite(d, A, b) else None
     if answer is None or answer.status != 0:
         return np.zeros(A.shape[0]), np.zeros(A.shape[1])
     return np.array(-answer.eqlin.marginals), np.array(answer.x)
@@ -71,7 +71,7 @@ def _highs_proves_empty(A: Matrix, b: Vector) -> bool:
     """A Farkas ray from the multipliers of ``min Σ|A ξ − b|`` over scaled rows."""
     from scipy.optimize import linprog
 
-    if not (np.isfinite(A).all() and np.isfinite(b).all()):
+    if not are_finite(A, b):
         return False  # numbers that have outgrown double precision prove nothing
     m, g = A.shape
     scale = np.abs(A).max(axis=1, initial=0.0)

@@ -105,3 +105,9 @@ def test_a_wide_source_changes_nothing_and_a_long_one_cuts_exactly() -> None:
     assert engine.snapshot() is before
     assert engine.condition(LONG) == 0.0, "the diagonal strip leaves the hull"
     np.testing.assert_allclose(engine.support.ranges([[-1.0, 1.0]]), ([-0.2], [0.2]), rtol=0, atol=1e-8)
+
+
+def test_a_set_at_the_end_of_all_numbers_leaves_x_as_it_is() -> None:
+    far, own = (ConstrainedZonotope([sign * 1.5e308, 0.0], np.eye(2), np.zeros((0, 2)), []) for sign in (-1, 1))
+    body = own.arrays
+    assert joined(body, own.bounds(), far, None) is body

@@ -13,6 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 from ports import free_port
+from waiting import WITHIN, until
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.keys import READER, key
@@ -25,13 +26,6 @@ pytestmark = pytest.mark.live
 
 NAMES = ("main", "plant", "s1", "box")
 """Peers that find one another through the one that holds the entry."""
-
-
-def until(met: Callable[[], bool], what: str, timeout: float = 30.0) -> None:
-    end = time.monotonic() + timeout
-    while not met():
-        assert time.monotonic() < end, what
-        time.sleep(0.02)
 
 
 @pytest.fixture
@@ -115,9 +109,9 @@ def test_what_was_published_meanwhile_arrives(peers: Sequence[Bus], port: int) -
         publish()
     shut_down_a_link(port)
     until(lambda: not are_whole(peers), "the link is gone")
-    end = time.monotonic() + 30
+    end = time.monotonic() + WITHIN
     while not are_whole(peers):
-        assert time.monotonic() < end
+        assert time.monotonic() < end, "the link is back"
         publish()
     for _ in range(25):
         publish()

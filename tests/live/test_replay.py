@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import functools
 import signal
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import msgpack
@@ -12,22 +11,25 @@ import numpy as np
 import pytest
 from local_mesh import LocalMesh
 from recorded_mesh import record
+from waiting import until
 
 from lsu_mesh.mesh.config import load
 from services.recording.read import RawMessage, parts, read_raw, read_recording
 
 pytestmark = pytest.mark.live
 
+until_recorded = functools.partial(until, what="the recorder has written it", timeout=120, pause=0.2)
+
 
 def test_a_run_in_which_a_filter_and_the_recorder_are_killed_is_exact(start_run, start) -> None:  # type: ignore[no-untyped-def]
     session = start_run("--steps", "100000", "--record", "killed.rrd")
     first, second = session.folder / "killed.rrd", session.folder / "killed.part2.rrd"
-    until(lambda: count(first, "fused/main") >= 20)
+    until_recorded(lambda: count(first, "fused/main") >= 20)
     session.child("recorder recorder").kill()
     session.child("filter box").kill()
     everyone = ("fused/main", "posterior/box", "posterior/para", "posterior/cz")
-    until(lambda: min(count(second, ending) for ending in everyone) >= 80)
-    until(lambda: boots_of(second, "filter/box") - boots_of(first, "filter/box"))
+    until_recorded(lambda: min(count(second, ending) for ending in everyone) >= 80)
+    until_recorded(lambda: boots_of(second, "filter/box") - boots_of(first, "filter/box"))
     session.process.send_signal(signal.SIGINT)
     assert session.wait() == 0, session.output[1]
     assert list(parts(first)) == [first, second]
@@ -36,14 +38,6 @@ def test_a_run_in_which_a_filter_and_the_recorder_are_killed_is_exact(start_run,
     (summary,) = verification.of("verification")
     assert summary["different"] == summary["miss_truth"] == 0
     assert summary["exact"] >= 7 * 70, "of four estimators, three of which publish two sets a step"
-
-
-def until(holds: Callable[[], object], timeout: float = 120) -> None:
-    """Wait for something that the recorder has to write."""
-    end = time.monotonic() + timeout
-    while not holds():
-        assert time.monotonic() < end, "the recorder has not written it"
-        time.sleep(0.2)
 
 
 def count(recording: Path, ending: str) -> int:

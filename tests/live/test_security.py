@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from ports import free_port
+from waiting import WITHIN, until
 
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.keys import key, last_key, model_key
@@ -21,8 +22,6 @@ from services.security import certificates
 pytestmark = pytest.mark.live
 
 Open = Callable[..., Bus]
-WITHIN = 30.0
-"""Seconds for what usually takes milliseconds."""
 QUIET = 0.4
 """Seconds without a message after which none is under way any more."""
 WORDS = "application/octet-stream"
@@ -73,14 +72,6 @@ def enter(
         return sessions(SessionSettings(() if listen else (endpoint,), own, mode=mode, certificates=files))
 
     return begin
-
-
-def until(met: Callable[[], bool], what: str) -> None:
-    """Wait for a condition."""
-    end = time.monotonic() + WITHIN
-    while not met():
-        assert time.monotonic() < end, f"{what}: not within {WITHIN} s"
-        time.sleep(0.01)
 
 
 def came(bus: Bus, *expected: str) -> set[str]:

@@ -25,8 +25,7 @@ def published(pace: Pace, late: int, seconds: float) -> list[tuple[int, int]]:
     now, behind, out = 10 * SECOND, float(late), []
     begin, end = now, now + int(seconds * SECOND)
     while now < end:
-        steps = min(int(behind), pace.allowed(now))
-        pace.spend(steps)
+        steps = pace.take(int(behind), now)
         behind -= steps
         out += [(now - begin, steps)] if steps else []
         later = max(pace.ready_at(), now + 1_000_000)
@@ -39,8 +38,7 @@ def test_a_source_in_time_never_waits() -> None:
     pace = Pace(RATE, KEPT)
     for k in range(2000):
         now = int(k / RATE * SECOND)
-        assert pace.allowed(now) >= 1
-        pace.spend(1)
+        assert pace.take(1, now) == 1
         assert pace.ready_at() == 0
 
 
@@ -67,12 +65,12 @@ def test_a_time_that_it_names_is_one_at_which_a_step_may_go_out() -> None:
     pace = Pace(RATE, KEPT)
     now = 0
     for _ in range(500):
-        pace.spend(pace.allowed(now))
+        pace.take(1000, now)
         at = pace.ready_at()
         assert at > now
-        assert pace.allowed(at - 1000) == 0
+        assert pace.take(1, at - 1000) == 0
         now = at
-        assert pace.allowed(now) >= 1
+        assert pace.take(1, now) == 1
 
 
 def test_a_plant_whose_machine_stood_still_publishes_every_step_but_not_at_once(demo: Path) -> None:

@@ -36,15 +36,13 @@ class Pace:
         self._spent = 0
         """Steps since then."""
 
-    def allowed(self, now: int) -> int:
-        """How many steps may go out now; times never go back."""
+    def take(self, steps: int, now: int) -> int:
+        """How many of these steps may go out now, and do; times never go back."""
         if self._full_at is None or self._filled(now) >= self._spent:
             self._full_at, self._spent = now, 0
-        return self._most - self._spent + int(self._filled(now))
-
-    def spend(self, steps: int) -> None:
-        """So many went out."""
-        self._spent += steps
+        taken = max(0, min(steps, self._most - self._spent + int(self._filled(now))))
+        self._spent += taken
+        return taken
 
     def ready_at(self) -> int:
         """When a step may go out, 0 for at once."""

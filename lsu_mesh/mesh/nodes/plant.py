@@ -78,12 +78,11 @@ class PlantNode(Node):
             self._past = self._past_before(due)
         if self._next < self._past.stop:
             return self._catch_up(self._past, now)
-        first, end = self._next, min(due + 1, self._next + MOST_AT_ONCE, self._next + self._pace.allowed(now))
+        steps = self._pace.take(min(MOST_AT_ONCE, due + 1 - self._next), now)
         messages: list[Message] = []
-        for k in range(first, end):
+        for k in range(self._next, self._next + steps):
             messages.append(Truth(**self.stamp("truth", k, now), x=self._x.tolist()))
             messages += self._drive(k, now, publish=True)
-        self._pace.spend(self._next - first)
         return messages
 
     def _past_before(self, due: int) -> range:

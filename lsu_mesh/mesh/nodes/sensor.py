@@ -102,8 +102,7 @@ class FileSensorNode(Node):
         if mesh.steps is not None:
             self._last = min(self._last, mesh.steps)
         self._told_collisions = False
-        self._kept = configuration.cached
-        self._pace = Pace(mesh.rate, self._kept)
+        self._pace = Pace(mesh.rate, configuration.cached)
         self._has_begun = False
         """Whether a step has been due."""
 
@@ -126,12 +125,11 @@ class FileSensorNode(Node):
         due = min(self._schedule.due(now), self._last)
         if not self._has_begun and due:
             self._has_begun = True
-            self._next = max(self._next, due - self._kept + 1)  # what came before would be too late for everybody
-        end = min(due, self._next + min(MOST_AT_ONCE, self._pace.allowed(now)) - 1)
-        self._pace.spend(max(0, end + 1 - self._next))
-        while self._next <= end:
-            messages.append(self._measurement(self._next, now))
-            self._next += 1
+            kept = self.configuration.cached
+            self._next = max(self._next, due + 1 - kept)  # what came before would be too late for everybody
+        steps = self._pace.take(min(MOST_AT_ONCE, due + 1 - self._next), now)
+        messages += [self._measurement(k, now) for k in range(self._next, self._next + steps)]
+        self._next += steps
         return messages
 
     def _measurement(self, k: int, now: int) -> Measurement:
