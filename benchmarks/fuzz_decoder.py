@@ -16,13 +16,14 @@ import atheris
 with atheris.instrument_imports(include=["lsu_mesh.mesh"]):
     from lsu_mesh.mesh.config import load
     from lsu_mesh.mesh.keys import key
-    from lsu_mesh.mesh.messages import TYPES, Refused, decode, encode, example
+    from lsu_mesh.mesh.message_examples import example
+    from lsu_mesh.mesh.messages import TYPES, Refused, decode, encode
     from lsu_mesh.mesh.nodes.filter import FilterNode
     from lsu_mesh.mesh.nodes.fusion import FusionNode
     from lsu_mesh.mesh.nodes.node import Node
 
 TOPICS = tuple(TYPES)
-CONFIGURATION = load(Path(__file__).resolve().parent.parent / "services" / "demo.toml")
+CONFIGURATION = load(Path(__file__).resolve().parent.parent / "services" / "lsu_mesh_services" / "demo.toml")
 NAMES = {"truth": "plant", "input": "plant", "measurement": "s1", "fused": "main"}
 
 

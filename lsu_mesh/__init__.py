@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from lsu_mesh.filters.lsupb import LSUPB
     from lsu_mesh.filters.run import FilterRun, run_filter
     from lsu_mesh.filters.truncated_kalman import TruncatedKalman
-    from lsu_mesh.filters.window_map import WindowMAP
+    from lsu_mesh.filters.window.window_map import WindowMAP
     from lsu_mesh.filters.zonotopic_kalman import ZonotopicKalman
-    from lsu_mesh.fusion.fuse import Fusion, fuse
+    from lsu_mesh.fusion.fuse import fuse
+    from lsu_mesh.fusion.intersection import Fusion
     from lsu_mesh.model import LSUModel
     from lsu_mesh.simulation import Simulation, simulate
     from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
@@ -36,7 +37,7 @@ _HOMES = {
     "Filter": "lsu_mesh.filters.filter",
     "FilterBank": "lsu_mesh.filters.bank",
     "FilterRun": "lsu_mesh.filters.run",
-    "Fusion": "lsu_mesh.fusion.fuse",
+    "Fusion": "lsu_mesh.fusion.intersection",
     "InconsistentData": "lsu_mesh.errors",
     "Intersection": "lsu_mesh.supports.intersection",
     "Kalman": "lsu_mesh.filters.kalman",
@@ -54,7 +55,7 @@ _HOMES = {
     "Support": "lsu_mesh.supports.support",
     "TruncatedKalman": "lsu_mesh.filters.truncated_kalman",
     "UnboundedSupport": "lsu_mesh.errors",
-    "WindowMAP": "lsu_mesh.filters.window_map",
+    "WindowMAP": "lsu_mesh.filters.window.window_map",
     "Zonotope": "lsu_mesh.supports.zonotope",
     "ZonotopicKalman": "lsu_mesh.filters.zonotopic_kalman",
     "fuse": "lsu_mesh.fusion.fuse",

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.filters.batch_map import Record, batch_map, record
 from lsu_mesh.filters.lsucz import LSUCZ
-from lsu_mesh.filters.window_program import HalfWidths, WindowSolution
-from lsu_mesh.filters.window_structure import Structure, Unknown, UnknownEntries
+from lsu_mesh.filters.window.batch_map import Record, batch_map, record
+from lsu_mesh.filters.window.program import HalfWidths, WindowSolution
+from lsu_mesh.filters.window.structure import Structure, Unknown, UnknownEntries
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 

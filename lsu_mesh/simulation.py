@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.kernels import plant
+from lsu_mesh.kernels import plant_step
 from lsu_mesh.model import LSUModel
 
 Vector = NDArray[np.float64]
@@ -93,9 +93,9 @@ def next_state(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vec
     B = np.zeros((n, 0)) if model.B is None else np.array(model.B)
     state, drive = np.array(x, dtype=np.float64), np.array(u, dtype=np.float64).reshape(model.input_count)
     if model.noise_map is None:
-        plant.bounded(A, state, B, drive, unit, np.array(model.rho), out)
+        plant_step.bounded(A, state, B, drive, unit, np.array(model.rho), out)
     else:
-        plant.mapped(A, state, B, drive, np.array(model.noise_map), unit, np.array(model.rho), out)
+        plant_step.mapped(A, state, B, drive, np.array(model.noise_map), unit, np.array(model.rho), out)
     return out
 
 
@@ -103,7 +103,7 @@ def measure(C: ArrayLike, r: ArrayLike, x: ArrayLike, unit: Vector) -> Vector:
     """``y = C x + r · unit`` (m,), the noise shrunk so that ``|y − C x| ≤ r`` holds exactly; C (m, n), r (m,)."""
     rows, state = np.array(C, dtype=np.float64), np.array(x, dtype=np.float64)
     out = np.empty(rows.shape[0])
-    plant.bounded(rows, state, np.zeros((rows.shape[0], 0)), np.zeros(0), unit, np.array(r, dtype=np.float64), out)
+    plant_step.bounded(rows, state, np.zeros((rows.shape[0], 0)), np.zeros(0), unit, np.array(r, dtype=np.float64), out)
     return out
 
 

@@ -19,10 +19,10 @@ def root() -> Path:
 @pytest.fixture(scope="session")
 def demo() -> Path:
     """The packaged configuration."""
-    return ROOT / "services" / "demo.toml"
+    return ROOT / "services" / "lsu_mesh_services" / "demo.toml"
 
 
 @pytest.fixture(scope="session")
 def lsu_mesh_command() -> list[str]:
     """The command line of this checkout."""
-    return [sys.executable, "-m", "services"]
+    return [sys.executable, "-P", "-m", "lsu_mesh_services"]

@@ -7,9 +7,10 @@ import os
 import sys
 from pathlib import Path
 
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh
+
 from lsu_mesh.mesh.config import load
-from services.recording.made_up_mesh import MadeUpMesh
-from services.recording.recorder import Recorder
 
 
 def main(mesh: str, file: str) -> None:

@@ -16,9 +16,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from lsu_mesh_services.recording.repair import quiet_environment
 from rerun.experimental import ViewerClient
-
-from services.recording.mend import quiet_environment
 
 VULKAN_DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")
 PATIENCE_S = 60.0

@@ -278,7 +278,7 @@ def _lost(mesh: LiveMesh, since: int) -> int:
 def slow_subscriber(mesh: LiveMesh, seconds: float = 10.0) -> Outcome:
     """A subscriber of everything that is frozen while its queues fill; the others must not feel it."""
     program = (
-        "import sys, time\nfrom services.bus import Bus, Clock, SessionSettings\n"
+        "import sys, time\nfrom lsu_mesh_services.bus import Bus, Clock, SessionSettings\n"
         "bus = Bus(SessionSettings(connect=(sys.argv[1],)), Clock())\n"
         f"bus.subscribe('{PREFIX}/*/*/*')\nbus.next(60)\nprint('hears', flush=True)\ntime.sleep(600)\n"
     )

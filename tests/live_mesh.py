@@ -14,22 +14,22 @@ from types import TracebackType
 from typing import Self
 
 import psutil
+from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.commands.keys import make_files
+from lsu_mesh_services.network.certificate_authority import LOOPBACK_HOSTS
+from lsu_mesh_services.network.gap_recovery import Recovery
+from lsu_mesh_services.network.security import certificates
+from lsu_mesh_services.supervisor import Child, Supervisor
 from ports import free_port
 from tcp_proxy import Proxy
 
+from lsu_mesh.mesh.admission import Gate
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.config.settings import SupervisorSettings
-from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.keys import PREFIX, READER, key
 from lsu_mesh.mesh.messages import TYPES, Event, Fused, Health, Message, Posterior, Truth
 from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from services.bus import Bus, Clock, SessionSettings
-from services.certificate_authority import LOOPBACK_HOSTS
-from services.commands.keys import make_files
-from services.recovery import Recovery
-from services.security import certificates
-from services.supervisor import Child, Supervisor
 
 ROOT = Path(__file__).resolve().parent.parent
 SPEAKS = {"plant": "truth", "sensor": "measurement", "filter": "posterior", "fusion": "fused"}
@@ -116,7 +116,7 @@ class LiveMesh:
         serve: int | None = None,
     ) -> None:
         self.star, self._topics, self._folder, self._serve = star, topics, folder, serve
-        file = Path(shutil.copy(ROOT / "services" / "demo.toml", folder / "mesh.toml"))
+        file = Path(shutil.copy(ROOT / "services" / "lsu_mesh_services" / "demo.toml", folder / "mesh.toml"))
         self._port = free_port()
         entry = f"{'tls' if star else 'tcp'}/127.0.0.1:{self._port}"
         secured = ["network.tls.enabled=true"] if star else []

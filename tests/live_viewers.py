@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from headless_viewer import HeadlessViewer
 from live_mesh import LiveMesh
+from lsu_mesh_services.recording.read import read_raw
 from ports import free_port
 
 from lsu_mesh.mesh.messages import Fused, decode
-from services.recording.read import read_raw
 
 PHASES = ("no viewer", "attached", "frozen", "killed")
 

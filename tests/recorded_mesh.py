@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from local_mesh import LocalMesh
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.synthetic_mesh import START_NS
 
 from lsu_mesh.mesh.messages import Message, encode
-from services.recording.made_up_mesh import START_NS
-from services.recording.recorder import Recorder
 
 Change = Callable[[Message, bytes], bytes]
 

@@ -23,16 +23,16 @@ LAYERS = {
     "lsu_mesh.identification": 6,
     "lsu_mesh.experiments": 6,
     "lsu_mesh.mesh": 7,
-    "services": 8,
+    "lsu_mesh_services": 8,
 }
 """A module imports only from its own layer (and package) and from those below."""
 FACADE = "lsu_mesh"
 
 
 def modules(root: Path) -> Iterator[tuple[str, Path]]:
-    for package in ("lsu_mesh", "services"):
-        for path in sorted((root / package).rglob("*.py")):
-            parts = path.relative_to(root).with_suffix("").parts
+    for home, package in ((root, "lsu_mesh"), (root / "services", "lsu_mesh_services")):
+        for path in sorted((home / package).rglob("*.py")):
+            parts = path.relative_to(home).with_suffix("").parts
             yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
 
 
@@ -84,7 +84,7 @@ def test_the_library_imports_neither_zenoh_nor_rerun_nor_messagepack(root: Path)
     for name, path in modules(root):
         tops = {imported.split(".")[0] for imported in imports(path, runtime=False)}
         if name.startswith("lsu_mesh"):
-            assert not tops & {"zenoh", "rerun", "services", "rich"}, name
+            assert not tops & {"zenoh", "rerun", "lsu_mesh_services", "rich"}, name
         if name.startswith("lsu_mesh") and not name.startswith("lsu_mesh.mesh"):
             assert not tops & {"msgspec", "msgpack"}, name
 
@@ -92,15 +92,15 @@ def test_the_library_imports_neither_zenoh_nor_rerun_nor_messagepack(root: Path)
 def test_only_the_bus_imports_zenoh_and_only_the_recording_imports_rerun(root: Path) -> None:
     for name, path in modules(root):
         tops = {imported.split(".")[0] for imported in imports(path, runtime=False)}
-        assert ("zenoh" in tops) <= (name == "services.bus"), name
-        assert ("rerun" in tops) <= name.startswith("services.recording"), name
+        assert ("zenoh" in tops) <= (name == "lsu_mesh_services.bus"), name
+        assert ("rerun" in tops) <= name.startswith("lsu_mesh_services.recording"), name
 
 
 @pytest.mark.parametrize(
     ("program", "forbidden"),
     [
         (
-            "from services.cli import build_parser; build_parser().format_help()",
+            "from lsu_mesh_services.cli import build_parser; build_parser().format_help()",
             ("zenoh", "rerun", "numba", "scipy", "numpy"),
         ),
         ("import lsu_mesh", ("zenoh", "rerun", "msgspec", "msgpack", "numba", "scipy")),
@@ -115,7 +115,7 @@ def test_imports_happen_when_they_are_needed(root: Path, program: str, forbidden
 
 def test_the_help_of_the_command_comes_without_heavy_imports(root: Path) -> None:
     check = (
-        "import sys\nfrom services.cli import main\n"
+        "import sys\nfrom lsu_mesh_services.cli import main\n"
         "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
         "print([name for name in ('zenoh', 'rerun', 'numba', 'scipy') if name in sys.modules])"
     )

@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> int:
 def run_mesh(flight: str, file: Path, start: float, recording: Path, options: list[str]) -> int:
     """``lsu-mesh run`` with this flight in the place of the configuration's; its first state vector is step 1."""
     command = [
-        sys.executable, "-m", "services", "run", str(HERE / "adsb.toml"),
+        sys.executable, "-P", "-m", "lsu_mesh_services", "run", str(HERE / "adsb.toml"),
         "--record", str(recording),
         "-X", f'mesh.name="{flight}"',
         "-X", f"mesh.start_time={start - 1.0}",

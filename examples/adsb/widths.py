@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import msgpack
-
-from services.recording.read import read_raw
+from lsu_mesh_services.recording.read import read_raw
 
 CELL = 25.0
 ROUNDING = 1e-9

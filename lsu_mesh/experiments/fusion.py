@@ -22,7 +22,8 @@ from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.filters.lsup import LSUP
 from lsu_mesh.filters.lsupb import LSUPB
-from lsu_mesh.fusion.fuse import Fusion, fuse
+from lsu_mesh.fusion.fuse import fuse
+from lsu_mesh.fusion.intersection import Fusion
 from lsu_mesh.metrics import rmse
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import simulate

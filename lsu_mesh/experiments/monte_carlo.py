@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.rounding import UNDERFLOW, gamma
+from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation, generator
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from lsu_mesh import systems
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.experiments.fusion import Make
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
+from lsu_mesh.experiments.transfer_result import Result
 from lsu_mesh.experiments.workers import Watch, spread, unwatched
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
@@ -73,29 +74,6 @@ class Sums:
     points: list[Vector] = field(default_factory=list)
     isolated_points: list[Vector] = field(default_factory=list)
     truth: list[Vector] = field(default_factory=list)
-
-
-class Result(NamedTuple):
-    """One point of the curves; ratios are to the isolated filter."""
-
-    system: str
-    kind: str
-    way: str
-    ratio: float
-    """r_S ÷ r"""
-    width: float
-    """Mean width, mean over coordinates."""
-    widest: float
-    """Mean width of the coordinate that has gained least."""
-    worst_step: float
-    """Largest ratio of widths in any step and coordinate: a filter of limited complexity is not monotone."""
-    tnse: float
-    """Total norm-squared error of all steps and seeds; ``tnse_ratio`` is to that of the isolated filter."""
-    tnse_ratio: float
-    gain: float
-    inside: float
-    rejected: float
-    restarts: float
 
 
 def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from lsu_mesh.experiments.transfer import Result
+from lsu_mesh.experiments.transfer_result import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

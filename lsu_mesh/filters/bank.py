@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.filters.arguments import checked_prior, kernel_model
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.run import FilterRun
-from lsu_mesh.kernels import loops
-from lsu_mesh.kernels.scratch import scratch
+from lsu_mesh.filters.validation import checked_prior, kernel_model
+from lsu_mesh.kernels import batch_run
+from lsu_mesh.kernels.runtime.scratch import scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.support import Support
 
@@ -93,7 +93,7 @@ class FilterBank:
         """Data update with Y (N, m), NaN for missing; ``False`` marks an instance whose data contradict its set."""
         outputs = self._table("Y", Y, self._models.C.shape[1])[:, np.newaxis]
         outcome = self._sweep(outputs, self._no_inputs(1), True, False)[1]
-        return np.equal(outcome[:, 1], loops.DONE)
+        return np.equal(outcome[:, 1], batch_run.DONE)
 
     def predict(self, U: ArrayLike | None = None) -> Flags:
         """Time update with U (N, p); ``False`` marks an instance whose prediction misses its domain."""
@@ -103,7 +103,7 @@ class FilterBank:
         inputs = self._no_inputs(1) if U is None else self._table("U", U, p)[:, np.newaxis]
         outputs = np.zeros((len(self), 1, self._models.C.shape[1]))
         outcome = self._sweep(outputs, inputs, False, True)[1]
-        return np.equal(outcome[:, 1], loops.DONE)
+        return np.equal(outcome[:, 1], batch_run.DONE)
 
     def run(self, Y: ArrayLike, U: ArrayLike | None = None) -> tuple[FilterRun, NDArray[np.int64]]:
         """All rows of Y (N, T, m) with inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
@@ -133,12 +133,12 @@ class FilterBank:
 
     def _sweep(
         self, Y: Stack, U: Stack, updating: bool, last_prediction: bool
-    ) -> tuple[loops.Record, NDArray[np.int64]]:
+    ) -> tuple[batch_run.Record, NDArray[np.int64]]:
         record = _record(len(self), Y.shape[1] if updating else 0, self._states.shape[2], Y.shape[2])
         outcome = np.zeros((len(self), 2), dtype=np.int64)
 
         def share(first: int, last: int) -> None:
-            loops.sweep(
+            batch_run.sweep(
                 self._filter.family, self._filter.option, updating, last_prediction, self._states,
                 np.empty_like(self._states[0]), self._models, Y, U, record, outcome, first, last,
                 scratch(self._states.shape[2], self._models.G.shape[2]),
@@ -158,7 +158,7 @@ def _in_shares(work: Callable[[int, int], None], count: int, threads: int) -> No
         list(pool.map(work, edges[:-1], edges[1:]))
 
 
-def _stack(models: Sequence[LSUModel]) -> loops.Models:
+def _stack(models: Sequence[LSUModel]) -> batch_run.Models:
     """Arrays of the models with a leading axis; ``ModelError`` where their shapes or their having a domain differ."""
     arrays = [kernel_model(model) for model in models]
     n = models[0].state_count
@@ -168,7 +168,7 @@ def _stack(models: Sequence[LSUModel]) -> loops.Models:
         raise ModelError("the models of a bank must have equal shapes, and all of them a domain or none")
     domains = np.array([box.bounds() for box in with_domain]) if with_domain else np.zeros((len(models), 0, n))
     widths = [np.concatenate([one.rho, np.zeros(one.B.shape[1])]) for one in arrays]
-    return loops.Models(
+    return batch_run.Models(
         A=np.array([one.A for one in arrays]),
         B=np.array([one.B for one in arrays]),
         C=np.array([one.C for one in arrays]),
@@ -179,8 +179,8 @@ def _stack(models: Sequence[LSUModel]) -> loops.Models:
     )
 
 
-def _record(count: int, rows: int, n: int, m: int) -> loops.Record:
+def _record(count: int, rows: int, n: int, m: int) -> batch_run.Record:
     def blank(*shape: int) -> Stack:
         return np.full((count, rows, *shape), np.nan)
 
-    return loops.Record(blank(n), blank(n), blank(n), blank(), blank(m), blank(m), blank(m))
+    return batch_run.Record(blank(n), blank(n), blank(n), blank(), blank(m), blank(m), blank(m))

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.arguments import (
+from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.validation import (
     checked_prior,
     half_width_vector,
     input_interval,
@@ -18,10 +20,8 @@ from lsu_mesh.filters.arguments import (
     output_vector,
     same_states,
 )
-from lsu_mesh.filters.contradiction import strip_contradiction
-from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.kernels import loops, step
-from lsu_mesh.kernels.scratch import Scratch, scratch
+from lsu_mesh.kernels import batch_run, filter_step
+from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -31,7 +31,7 @@ Matrix = NDArray[np.float64]
 
 
 class CompiledFilter(Filter):
-    """A filter whose steps are those of ``kernels/step.py`` for its ``family`` and ``option``.
+    """A filter whose steps are those of ``kernels/filter_step.py`` for its ``family`` and ``option``.
 
     The state is a matrix with rows of length n. It is never written again once it is in force, so that a snapshot is
     the matrix itself.
@@ -100,8 +100,8 @@ class CompiledFilter(Filter):
         widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
         work = self._work if widths.size == self._arrays.G.shape[1] else self._scratch(widths.size)
         state = np.empty_like(self._state)
-        status = step.advance(
-            step.PREDICT, self.family, self.option, self._state, self._arrays.C, center, center,
+        status = filter_step.advance(
+            filter_step.PREDICT, self.family, self.option, self._state, self._arrays.C, center, center,
             arrays.A, arrays.B, center, arrays.G, widths, state, work,
         )  # fmt: skip
         if status == 0 and step_model.domain is not None:
@@ -144,15 +144,15 @@ class CompiledFilter(Filter):
         """Whether :meth:`sweep` does what the steps one by one would do."""
         return True
 
-    def sweep(self, Y: Matrix, U: Matrix, record: loops.Record) -> tuple[int, int]:
+    def sweep(self, Y: Matrix, U: Matrix, record: batch_run.Record) -> tuple[int, int]:
         """Update and predict for all rows of Y (T, m), U (T, p) in a compiled loop; ``record`` has a leading axis 1.
 
-        Returns the rows that are done, and where it stopped (``kernels/loops.py``); the filter holds the last good
+        Returns the rows that are done, and where it stopped (``kernels/batch_run.py``); the filter holds the last good
         state.
         """
         a = self._arrays
         domain = self._model.domain
-        models = loops.Models(
+        models = batch_run.Models(
             A=a.A[np.newaxis],
             B=a.B[np.newaxis],
             C=a.C[np.newaxis],
@@ -162,7 +162,7 @@ class CompiledFilter(Filter):
             domains=np.zeros((1, 0, len(a.A))) if domain is None else np.array([domain.bounds()]),
         )
         states, outcome = self._state[np.newaxis].copy(), np.zeros((1, 2), dtype=np.int64)
-        loops.sweep(
+        batch_run.sweep(
             self.family, self.option, True, False, states, np.empty_like(self._state), models,
             Y[np.newaxis], U[np.newaxis], record, outcome, 0, 1, self._work,
         )  # fmt: skip
@@ -174,16 +174,16 @@ class CompiledFilter(Filter):
 
     def _cut(self, state: Matrix, P: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
         """The part of ``state`` in the strips ``|y − P x| ≤ r``, and the status of the kernel."""
-        return self._restrict(step.UPDATE, state, P, y, r)
+        return self._restrict(filter_step.UPDATE, state, P, y, r)
 
     def _meet_box(self, state: Matrix, box: Orthotope) -> tuple[Matrix, int]:
         """The part of ``state`` in a box, and the status of the kernel."""
-        return self._restrict(step.MEET_BOX, state, self._arrays.C, np.array(box.lower), np.array(box.upper))
+        return self._restrict(filter_step.MEET_BOX, state, self._arrays.C, np.array(box.lower), np.array(box.upper))
 
     def _restrict(self, action: int, state: Matrix, P: Matrix, first: Vector, second: Vector) -> tuple[Matrix, int]:
         new = np.empty_like(state)
         a = self._arrays
-        status = step.advance(
+        status = filter_step.advance(
             action, self.family, self.option, state, P, first, second,
             a.A, a.B, a.rho, a.G, a.rho, new, self._work,
         )  # fmt: skip
@@ -192,14 +192,14 @@ class CompiledFilter(Filter):
     def _describe(self, state: Matrix) -> tuple[Vector, Vector, Vector, float]:
         n = self._model.state_count
         point, lower, upper = np.empty(n), np.empty(n), np.empty(n)
-        return point, lower, upper, step.describe(self.family, state, point, lower, upper, self._work)
+        return point, lower, upper, filter_step.describe(self.family, state, point, lower, upper, self._work)
 
     def _log_volume(self, state: Matrix) -> float:
-        return step.log_volume(self.family, state, self._work)
+        return filter_step.log_volume(self.family, state, self._work)
 
     def _predict_output(self, r: Vector) -> OutputPrediction:
         lower, upper, point = np.empty(r.size), np.empty(r.size), np.empty(r.size)
-        step.predict_output(self.family, self._state, self._arrays.C, r, lower, upper, point, self._work)
+        filter_step.predict_output(self.family, self._state, self._arrays.C, r, lower, upper, point, self._work)
         return OutputPrediction(lower, upper, point)
 
     def _accept(self, state: Matrix, status: int) -> None:

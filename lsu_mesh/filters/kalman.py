@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.filters.arguments import (
+from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
+from lsu_mesh.filters.transfer_gain import hull_gain
+from lsu_mesh.filters.validation import (
     checked_prior,
     half_width_vector,
     input_interval,
@@ -16,8 +18,6 @@ from lsu_mesh.filters.arguments import (
     output_vector,
     same_states,
 )
-from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
-from lsu_mesh.filters.gain import hull_gain
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support

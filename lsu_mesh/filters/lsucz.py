@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.arguments import (
+from lsu_mesh.filters.constrained_intersection import joined
+from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.transfer_gain import hull_gain
+from lsu_mesh.filters.validation import (
     checked_prior,
     half_width_vector,
     input_interval,
@@ -17,12 +21,8 @@ from lsu_mesh.filters.arguments import (
     output_vector,
     same_states,
 )
-from lsu_mesh.filters.contradiction import strip_contradiction
-from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.filters.gain import hull_gain
-from lsu_mesh.filters.joining import joined
-from lsu_mesh.kernels.constrained import meet_strips
-from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
+from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
+from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.arrays import box_volume
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope

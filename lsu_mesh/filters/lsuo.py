@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
-from lsu_mesh.kernels import step
+from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -41,7 +41,7 @@ class LSUO(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUO"
-    family: ClassVar[int] = step.BOX
+    family: ClassVar[int] = filter_step.BOX
 
     def __init__(
         self,

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
-from lsu_mesh.kernels import parallelotope, step
+from lsu_mesh.kernels import filter_step
+from lsu_mesh.kernels.parallelotopes import parallelotope
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
@@ -58,7 +59,7 @@ class LSUP(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUP"
-    family: ClassVar[int] = step.PARALLELOTOPE
+    family: ClassVar[int] = filter_step.PARALLELOTOPE
 
     def __init__(
         self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], time_update: TimeUpdate = "image"

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
-from lsu_mesh.kernels import step
+from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
@@ -40,7 +40,7 @@ class LSUPB(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUPB"
-    family: ClassVar[int] = step.BUNDLE
+    family: ClassVar[int] = filter_step.BUNDLE
 
     def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike]) -> None:
         super().__init__(model, prior, option=0)

@@ -16,7 +16,7 @@ FILTERS: dict[str, str] = {
     "LSUP": "lsu_mesh.filters.lsup",
     "LSUPB": "lsu_mesh.filters.lsupb",
     "TruncatedKalman": "lsu_mesh.filters.truncated_kalman",
-    "WindowMAP": "lsu_mesh.filters.window_map",
+    "WindowMAP": "lsu_mesh.filters.window.window_map",
     "ZonotopicKalman": "lsu_mesh.filters.zonotopic_kalman",
 }
 """Kind of a filter (the name of its class) → module that holds it."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from lsu_mesh.errors import InconsistentData, LsuMeshError, ModelError, UnboundedSupport
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.kernels import loops
+from lsu_mesh.kernels import batch_run
 
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
@@ -56,10 +56,10 @@ def run_filter(filter: Filter, Y: ArrayLike, U: ArrayLike | None = None) -> Filt
         np.empty((rows, m)), np.empty((rows, m)), np.empty((rows, m)),
     )  # fmt: skip
     if isinstance(filter, CompiledFilter) and filter.has_compiled_loop:
-        row, where = filter.sweep(outputs, inputs, loops.Record(*(table[np.newaxis] for table in run)))
-        if where == loops.IN_UPDATE:
+        row, where = filter.sweep(outputs, inputs, batch_run.Record(*(table[np.newaxis] for table in run)))
+        if where == batch_run.IN_UPDATE:
             _update(filter, outputs, row)
-        elif where == loops.IN_PREDICT:
+        elif where == batch_run.IN_PREDICT:
             _predict(filter, inputs, row - 1)
         return run
     for k in range(rows):

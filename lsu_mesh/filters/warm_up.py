@@ -16,8 +16,9 @@ import numpy as np
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.registry import FILTERS, filter_class
 from lsu_mesh.filters.run import run_filter
-from lsu_mesh.kernels import hull, step
-from lsu_mesh.kernels.compile import awaits_compilation
+from lsu_mesh.kernels import filter_step
+from lsu_mesh.kernels.linear_programs import safe_maxima
+from lsu_mesh.kernels.runtime.compile import awaits_compilation
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import simulate
 from lsu_mesh.supports.orthotope import Orthotope
@@ -41,7 +42,7 @@ SHARES = {
 def warm_up() -> float:
     """Run every filter for a few steps, with and without a noise map and a domain; the seconds that it took."""
     began = time.perf_counter()
-    if awaits_compilation(step.advance) and awaits_compilation(hull.maxima) and _cores() > 1:
+    if awaits_compilation(filter_step.advance) and awaits_compilation(safe_maxima.maxima) and _cores() > 1:
         _compile_in_processes()
     A, B, C = [[0.9, 0.2], [-0.1, 0.8]], [[0.1], [0.2]], [[1.0, 0.0], [1.0, 1.0]]
     prior = Orthotope([-1.0, -1.0], [1.0, 1.0])
@@ -59,7 +60,7 @@ def warm_up() -> float:
 
 def _compile_in_processes() -> None:
     """Fill the cache by one process for each share; what they leave out, or fail at, is compiled here afterwards."""
-    command = [sys.executable, "-m", "lsu_mesh.filters.warm_up"]
+    command = [sys.executable, "-P", "-m", "lsu_mesh.filters.warm_up"]
     children = [subprocess.Popen([*command, share], stderr=subprocess.DEVNULL) for share in SHARES]
     for child in children:
         child.wait()

@@ -8,7 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.arguments import (
+from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.transfer_gain import hull_gain
+from lsu_mesh.filters.validation import (
     checked_prior,
     half_width_vector,
     input_interval,
@@ -16,13 +19,10 @@ from lsu_mesh.filters.arguments import (
     output_vector,
     same_states,
 )
-from lsu_mesh.filters.contradiction import strip_contradiction
-from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.filters.gain import hull_gain
-from lsu_mesh.kernels.constrained import meet_strips
-from lsu_mesh.kernels.time_update import image_of_box, predict_constrained
-from lsu_mesh.kernels.zonotope import absorb_box
-from lsu_mesh.kernels.zonotopic_kalman import box_shortest, corrected, kalman_gain
+from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
+from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
+from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
+from lsu_mesh.kernels.zonotopes.zonotopic_kalman import box_shortest, corrected, kalman_gain
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.linear_programs import is_proved_empty
 from lsu_mesh.supports.orthotope import Orthotope

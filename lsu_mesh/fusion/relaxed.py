@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.fusion.fuse import Fusion, fuse_all
+from lsu_mesh.fusion.intersection import Fusion, fuse_all
 from lsu_mesh.supports.arrays import frozen
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.kernels.constrained import meet_sets, meet_strips
-from lsu_mesh.kernels.hull import open_program
-from lsu_mesh.kernels.surface import split_triangles
-from lsu_mesh.kernels.zonotope import absorb_box, add_centers, zonotope_map, zonotope_radius
+from lsu_mesh.kernels.linear_programs.safe_maxima import open_program
+from lsu_mesh.kernels.linear_programs.vertex_enumeration import split_triangles
+from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_sets, meet_strips
+from lsu_mesh.kernels.zonotopes.zonotope import absorb_box, add_centers, zonotope_map, zonotope_radius
 from lsu_mesh.supports.arrays import box_volume, finite_array, frozen, map_arguments
 from lsu_mesh.supports.exact import Membership
 from lsu_mesh.supports.exact_program import exact_solution

@@ -1,7 +1,7 @@
 """Linear programs over ``{ξ : A ξ = b, |ξ|∞ ≤ 1}`` with proved answers.
 
 The compiled simplex solves them, HiGHS those where it is troubled. Neither is believed, see
-:mod:`lsu_mesh.kernels.dual`.
+:mod:`lsu_mesh.kernels.linear_programs.dual_bound`.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound
-from lsu_mesh.kernels.hull import EMPTY, LOOSE, Program, maxima, open_program
+from lsu_mesh.kernels.linear_programs.dual_bound import absolute_row_sums, dual_bound
+from lsu_mesh.kernels.linear_programs.safe_maxima import EMPTY, LOOSE, Program, maxima, open_program
 from lsu_mesh.supports.arrays import are_finite
 
 Vector = NDArray[np.float64]

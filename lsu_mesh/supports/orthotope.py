@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.kernels.rounding import EPSILON, UNDERFLOW
+from lsu_mesh.kernels.runtime.rounding import EPSILON, UNDERFLOW
 from lsu_mesh.supports.arrays import box_volume, corners_are_few, finite_array
 from lsu_mesh.supports.support import Matrix, Support, Vector
 

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.kernels import linear_algebra, parallelotope, step, strip
-from lsu_mesh.kernels.enclosure import enclose_along_edges
-from lsu_mesh.kernels.scratch import scratch
+from lsu_mesh.kernels import filter_step
+from lsu_mesh.kernels.parallelotopes import parallelotope, strip_update
+from lsu_mesh.kernels.parallelotopes.enclosure import enclose_along_edges
+from lsu_mesh.kernels.runtime import linear_algebra
+from lsu_mesh.kernels.runtime.scratch import scratch
 from lsu_mesh.supports.arrays import corners_are_few, finite_array, frozen
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
 from lsu_mesh.supports.support import Matrix, Support, Vector
@@ -57,11 +59,11 @@ class Parallelotope(Support):
 
     def bounds(self) -> tuple[Vector, Vector]:
         lower, upper = np.empty(self.dim), np.empty(self.dim)
-        strip.hull(self._center, self._generators, np.zeros(self.dim), lower, upper)
+        strip_update.hull(self._center, self._generators, np.zeros(self.dim), lower, upper)
         return lower, upper
 
     def volume(self) -> float:
-        return step.volume_of(self._generators, np.empty_like(self._generators))
+        return filter_step.volume_of(self._generators, np.empty_like(self._generators))
 
     def log_volume(self) -> float:
         factor = np.empty_like(self._generators)
@@ -80,7 +82,7 @@ class Parallelotope(Support):
     def support(self, d: ArrayLike) -> float:
         direction = np.array(finite_array("d", d, (self.dim,)))
         g = np.empty(self.dim)
-        s, error, spread = strip.project(self._center, self._generators, np.zeros(self.dim), direction, g)
+        s, error, spread = strip_update.project(self._center, self._generators, np.zeros(self.dim), direction, g)
         return float(np.nextafter(np.nextafter(s + spread, np.inf) + error, np.inf))
 
     def vertices(self) -> Matrix:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.hull import open_program, variable_ranges
-from lsu_mesh.kernels.reduction import reduce_complexity
+from lsu_mesh.kernels.linear_programs.safe_maxima import open_program, variable_ranges
+from lsu_mesh.kernels.zonotopes.complexity_reduction import reduce_complexity
 from lsu_mesh.supports.linear_programs import program_maxima
 
 Vector = NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.kernels.zonotope import (
+from lsu_mesh.kernels.zonotopes.zonotope import (
     absorb_box,
     parallelotope_volumes,
     zonotope_map,

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 import yaml
+from lsu_mesh_services.cli import build_parser
 
 from lsu_mesh.mesh.config import Configuration, load
-from services.cli import build_parser
 
 
 @pytest.fixture(scope="module")

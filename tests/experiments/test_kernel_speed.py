@@ -19,7 +19,7 @@ from lsu_mesh.experiments.kernel_speed.hulls import exact_vertex, own_hull, rand
 from lsu_mesh.experiments.kernel_speed.report import FULL, JUDGED
 from lsu_mesh.experiments.kernel_speed.steps import KINDS, plain_run, stable_model, unit_box
 from lsu_mesh.experiments.kernel_speed.stopwatch import Candidate, compare, one_core
-from lsu_mesh.kernels.hull import maxima, open_program
+from lsu_mesh.kernels.linear_programs.safe_maxima import maxima, open_program
 
 FLOOR = 20.0
 """Times that plain NumPy must at least take, on any machine however noisy; what is demanded is measured by hand."""

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lsu_mesh import InconsistentData, LSUModel, ModelError, Orthotope, Parallelotope, ZonotopicKalman
-from lsu_mesh.kernels.zonotope import absorb_box
-from lsu_mesh.kernels.zonotopic_kalman import box_shortest, corrected, kalman_gain
+from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
+from lsu_mesh.kernels.zonotopes.zonotopic_kalman import box_shortest, corrected, kalman_gain
 from lsu_mesh.supports.exact_program import exact_solution
 
 A = [[1.0, -0.5, 0.2], [0.5, 0.1, 0.0], [0.3, 0.0, -0.1]]

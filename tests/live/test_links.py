@@ -12,15 +12,15 @@ from pathlib import Path
 
 import psutil
 import pytest
+from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.commands.keys import make_files
+from lsu_mesh_services.network.certificate_authority import LOOPBACK_HOSTS
+from lsu_mesh_services.network.security import Certificates, certificates
 from ports import free_port
 from waiting import WITHIN, until
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.keys import READER, key
-from services.bus import Bus, Clock, SessionSettings
-from services.certificate_authority import LOOPBACK_HOSTS
-from services.commands.keys import make_files
-from services.security import Certificates, certificates
 
 pytestmark = pytest.mark.live
 

@@ -10,11 +10,11 @@ import msgpack
 import numpy as np
 import pytest
 from local_mesh import LocalMesh
+from lsu_mesh_services.recording.read import RawMessage, parts, read_raw, read_recording
 from recorded_mesh import record
 from waiting import until
 
 from lsu_mesh.mesh.config import load
-from services.recording.read import RawMessage, parts, read_raw, read_recording
 
 pytestmark = pytest.mark.live
 

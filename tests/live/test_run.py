@@ -22,7 +22,7 @@ Start = Callable[..., object]
 
 def until_steps_flow(session, timeout: float = 90.0) -> None:  # type: ignore[no-untyped-def]
     """Wait for the first fused set on the mesh."""
-    from services.bus import Bus, Clock, SessionSettings
+    from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 
     end = time.monotonic() + timeout
     with Bus(SessionSettings(connect=(session.endpoint,)), Clock()) as bus:
@@ -53,7 +53,7 @@ def test_the_demo_holds_the_truth_in_every_step_and_leaves_no_process(start_run)
 
 
 def test_one_interrupt_ends_the_run_cleanly_with_a_readable_recording(start_run) -> None:  # type: ignore[no-untyped-def]
-    from services.recording.read import read_raw
+    from lsu_mesh_services.recording.read import read_raw
 
     session = start_run("--record", "cut.rrd")
     until_steps_flow(session)
@@ -86,7 +86,7 @@ def test_the_others_go_on_when_a_filter_is_killed_and_the_run_says_so(start_run)
 
 
 def test_a_subscriber_of_ten_lines_sees_fused_bounds_that_hold_the_truth(start_run, root: Path) -> None:  # type: ignore[no-untyped-def]
-    from services.recording.read import read_raw
+    from lsu_mesh_services.recording.read import read_raw
 
     session = start_run("--steps", "250", "--record", "heard.rrd")
     command = [sys.executable, str(root / "examples" / "subscribe.py"), session.endpoint]
@@ -107,7 +107,7 @@ def test_a_subscriber_of_ten_lines_sees_fused_bounds_that_hold_the_truth(start_r
 
 
 def test_garbage_and_foreign_messages_are_refused_and_nobody_dies(start_run) -> None:  # type: ignore[no-untyped-def]
-    from services.bus import Bus, Clock, SessionSettings
+    from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 
     session = start_run("--steps", "300", "--no-record")
     until_steps_flow(session)

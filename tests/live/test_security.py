@@ -9,15 +9,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.commands.keys import make_files
+from lsu_mesh_services.network.certificate_authority import LOOPBACK_HOSTS, Authority
+from lsu_mesh_services.network.security import certificates
 from ports import free_port
 from waiting import WITHIN, until
 
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.keys import key, last_key, model_key
-from services.bus import Bus, Clock, SessionSettings
-from services.certificate_authority import LOOPBACK_HOSTS, Authority
-from services.commands.keys import make_files
-from services.security import certificates
 
 pytestmark = pytest.mark.live
 

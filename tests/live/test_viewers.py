@@ -11,9 +11,8 @@ import psutil
 import pytest
 from headless_viewer import why_not
 from live_viewers import PHASES, measure
-
-from services.recording.read import read_raw
-from services.viewers import Viewer, free_port
+from lsu_mesh_services.recording.read import read_raw
+from lsu_mesh_services.viewers import Viewer, free_port
 
 pytestmark = pytest.mark.live
 

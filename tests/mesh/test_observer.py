@@ -10,7 +10,8 @@ import pytest
 from msgspec import structs
 
 from lsu_mesh.mesh.config import Configuration, load
-from lsu_mesh.mesh.messages import Health, example
+from lsu_mesh.mesh.message_examples import example
+from lsu_mesh.mesh.messages import Health
 from lsu_mesh.mesh.nodes.node import SECOND, Node
 from lsu_mesh.mesh.observer import LEVELS, STALE_NS, HealthObserver, worst
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import msgpack
 import pytest
 
-from lsu_mesh.mesh.messages import TYPES, Message, decode, encode, example
+from lsu_mesh.mesh.message_examples import example
+from lsu_mesh.mesh.messages import TYPES, Message, decode, encode
 
 
 @pytest.fixture(scope="module")

@@ -6,14 +6,14 @@ import time
 from pathlib import Path
 
 import pytest
+from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.peer import Peer
 from ports import free_port
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import VERSION, Health, Input, encode, encoding
 from lsu_mesh.mesh.nodes.filter import FilterNode
-from services.bus import Bus, Clock, SessionSettings
-from services.peer import Peer
 
 pytestmark = pytest.mark.live
 MOST_AT_ONCE = 200

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.recorder import RecorderService
 
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import Health, decode, encode
-from services.arrivals import Arrival
-from services.recorder import RecorderService
 
 SECOND = 1_000_000_000
 

@@ -12,7 +12,7 @@ import pytest
 
 WAITING = """
 import sys, time
-from services.stop import Stop
+from lsu_mesh_services.stop import Stop
 stop = Stop()
 print("ready", flush=True)
 while not stop:
@@ -24,7 +24,7 @@ if "again" in sys.argv:
 """
 LEAVING = """
 import atexit, sys
-from services.stop import leave
+from lsu_mesh_services.stop import leave
 atexit.register(lambda: print("cleaned up"))
 if "zenoh" in sys.argv:
     sys.modules["zenoh"] = sys

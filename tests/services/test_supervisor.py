@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import psutil
 import pytest
+from lsu_mesh_services.supervisor import Child, Supervisor
 
 from lsu_mesh.mesh.config.settings import SupervisorSettings
-from services.supervisor import Child, Supervisor
 
 pytestmark = pytest.mark.live
 
@@ -79,7 +79,7 @@ def test_stopping_is_clean_and_leaves_nothing(supervisor: Supervisor) -> None:
 def test_a_frozen_child_is_killed_when_it_does_not_stop(
     supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("services.supervisor.PATIENCE_S", {"plant": 0.3})
+    monkeypatch.setattr("lsu_mesh_services.supervisor.PATIENCE_S", {"plant": 0.3})
     child = supervisor.start("router", "router", ["-l", endpoint()])
     wait_for_words(child, "listening")
     child.role = "plant"
@@ -95,7 +95,7 @@ def test_children_end_when_their_supervisor_is_gone() -> None:
     import sys
 
     program = (
-        "import time; from services.supervisor import Supervisor; "
+        "import time; from lsu_mesh_services.supervisor import Supervisor; "
         "from lsu_mesh.mesh.config.settings import SupervisorSettings; "
         f"s = Supervisor(SupervisorSettings()); c = s.start('router', 'router', ['-l', '{endpoint()}']); "
         "print(c.process.pid, flush=True); time.sleep(60)"

@@ -19,8 +19,8 @@ from lsu_mesh.experiments.kernel_speed.other_libraries import (
     zonoopt_hull,
 )
 from lsu_mesh.experiments.kernel_speed.stopwatch import Candidate, compare
-from lsu_mesh.kernels.dual import absolute_row_sums, dual_bound_in
-from lsu_mesh.kernels.hull import maxima, open_program
+from lsu_mesh.kernels.linear_programs.dual_bound import absolute_row_sums, dual_bound_in
+from lsu_mesh.kernels.linear_programs.safe_maxima import maxima, open_program
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 
 Vector = NDArray[np.float64]

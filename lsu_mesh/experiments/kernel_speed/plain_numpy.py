@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.kernels.strip import TIE
+from lsu_mesh.kernels.parallelotopes.strip_update import TIE
 from lsu_mesh.model import LSUModel
 
 Vector = NDArray[np.float64]

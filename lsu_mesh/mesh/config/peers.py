@@ -8,6 +8,7 @@ from pathlib import Path
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.registry import FILTERS, filter_class
+from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
 from lsu_mesh.mesh.config.settings import (
     FilterSettings,
     FusionSettings,
@@ -19,7 +20,6 @@ from lsu_mesh.mesh.config.settings import (
 )
 from lsu_mesh.mesh.config.table import REQUIRED, Problems, Table, file_at, nearest
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
-from lsu_mesh.mesh.playback import FileProblems, read_columns
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 

@@ -15,6 +15,11 @@ import numpy as np
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.estimation.epochs import Epochs
+from lsu_mesh.mesh.estimation.open_loop import Reach
+from lsu_mesh.mesh.estimation.step_arrivals import Signs
+from lsu_mesh.mesh.estimation.step_record import Base, Combined, Step, news
+from lsu_mesh.mesh.estimation.warm_up import rehearse
 from lsu_mesh.mesh.messages import (
     Bounds,
     Guarantee,
@@ -25,13 +30,8 @@ from lsu_mesh.mesh.messages import (
     Reference,
     SupportMessage,
 )
-from lsu_mesh.mesh.nodes.epochs import Epochs
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
-from lsu_mesh.mesh.nodes.reach import Reach
-from lsu_mesh.mesh.nodes.rehearsal import rehearse
-from lsu_mesh.mesh.nodes.signs import Signs
-from lsu_mesh.mesh.nodes.silence import Silences, input_key, start_keys
-from lsu_mesh.mesh.nodes.step import Base, Combined, Step, news
+from lsu_mesh.mesh.nodes.source_timeout import Silences, input_key, start_keys
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector

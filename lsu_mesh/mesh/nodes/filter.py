@@ -10,6 +10,12 @@ import numpy as np
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
+from lsu_mesh.mesh.estimation.inconsistency import Dropped, update_without_contradicting_strips, widen
+from lsu_mesh.mesh.estimation.message_fields import described, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.restart import Start, Starts
+from lsu_mesh.mesh.estimation.step_record import Combined, Status, Step
+from lsu_mesh.mesh.estimation.transfer import OLDEST_BOX, Transfer
 from lsu_mesh.mesh.messages import (
     Bounds,
     Fused,
@@ -22,14 +28,8 @@ from lsu_mesh.mesh.messages import (
     Suggestion,
     SupportMessage,
 )
-from lsu_mesh.mesh.nodes.adoption import adopted_model, is_due, make_engine
-from lsu_mesh.mesh.nodes.contradiction import Dropped, update_without_contradicting_strips, widen
-from lsu_mesh.mesh.nodes.described import described, finite_or_none, foretold
 from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND
-from lsu_mesh.mesh.nodes.starts import Start, Starts
-from lsu_mesh.mesh.nodes.step import Combined, Status, Step
-from lsu_mesh.mesh.nodes.transfer import OLDEST_BOX, Transfer
 from lsu_mesh.mesh.sets import to_message
 from lsu_mesh.supports.support import Vector
 

@@ -13,13 +13,13 @@ from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.estimation.message_fields import described_box
+from lsu_mesh.mesh.estimation.quarantine import Quarantine, Say
+from lsu_mesh.mesh.estimation.step_record import Combined, Status, Step
+from lsu_mesh.mesh.estimation.transfer import SOUND
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
-from lsu_mesh.mesh.nodes.described import described_box
 from lsu_mesh.mesh.nodes.estimator import START_GRACE, WEAKNESS, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint
-from lsu_mesh.mesh.nodes.quarantine import Quarantine, Say
-from lsu_mesh.mesh.nodes.step import Combined, Status, Step
-from lsu_mesh.mesh.nodes.transfer import SOUND
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.support import Support, Vector
 

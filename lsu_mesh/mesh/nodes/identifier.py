@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from lsu_mesh.errors import InconsistentData, LsuMeshError
-from lsu_mesh.filters.batch_map import Record
-from lsu_mesh.filters.window_structure import Structure
+from lsu_mesh.filters.window.batch_map import Record
+from lsu_mesh.filters.window.structure import Structure
 from lsu_mesh.identification import learn_choice, smallest
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration

@@ -9,8 +9,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
+from lsu_mesh.mesh.admission import Gate
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import VERSION, Event, Health, Message
 

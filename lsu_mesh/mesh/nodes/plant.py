@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from lsu_mesh.mesh.access import PUBLISHES
+from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Input, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
-from lsu_mesh.mesh.nodes.pace import Pace
+from lsu_mesh.mesh.nodes.rate_limit import Pace
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from lsu_mesh.mesh.playback import read_playback
 from lsu_mesh.simulation import input_at, next_state, random_uniform
 from lsu_mesh.supports.support import Vector
 

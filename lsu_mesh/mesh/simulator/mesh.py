@@ -19,9 +19,9 @@ from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
 from lsu_mesh.mesh.simulator.decoding import SharedDecoder
 from lsu_mesh.mesh.simulator.faults import FaultPlan, Skew
+from lsu_mesh.mesh.simulator.invariants import Witness
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
 from lsu_mesh.mesh.simulator.transport import MILLISECOND, Links, Port, Transport
-from lsu_mesh.mesh.simulator.witness import Witness
 
 LONGEST_WAIT_NS = SECOND // 10
 START_NS = 1_000 * SECOND

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from lsu_mesh.mesh.admission import ROLE_OF_TOPIC
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.gate import ROLE_OF_TOPIC
 from lsu_mesh.mesh.messages import Message, Posterior, Reference
 from lsu_mesh.mesh.simulator.broken import InvariantBroken
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from lsu_mesh.mesh.admission import Gate
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.gate import Gate
 from lsu_mesh.mesh.ledger import Ledger
 from lsu_mesh.mesh.messages import TYPES, Message, Reference
 from lsu_mesh.mesh.nodes.node import SECOND, Node

@@ -16,9 +16,9 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Posterior
 from lsu_mesh.mesh.simulator.broken import InvariantBroken
 from lsu_mesh.mesh.simulator.faults import FaultPlan, draw_plan
+from lsu_mesh.mesh.simulator.invariants import Witness
 from lsu_mesh.mesh.simulator.mesh import SimulatedMesh
 from lsu_mesh.mesh.simulator.variants import Variant, configured, draw_variant
-from lsu_mesh.mesh.simulator.witness import Witness
 from lsu_mesh.simulation import input_at, next_state, random_uniform
 
 TRAJECTORIES = 4

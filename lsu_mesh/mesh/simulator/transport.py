@@ -1,6 +1,6 @@
 """The bus of the simulation: caches, recovery, history for late joiners, and the faults of its links.
 
-It is modelled on the real one (``services/bus.py``): a publisher keeps its newest samples and tells every 100 ms
+It is modelled on the real one (``services``' ``bus.py``): a publisher keeps its newest samples and tells every 100 ms
 how far it is; a subscriber that misses some asks for them, and holds back what came after them meanwhile; whoever joins
 gets what the caches hold. What a publisher that died had cached is gone. Times are nanoseconds of true time.
 """

@@ -14,15 +14,15 @@ from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
+from lsu_mesh.mesh.estimation.inconsistency import update_without_contradicting_strips, widen
+from lsu_mesh.mesh.estimation.message_fields import described, described_box, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.open_loop import Reach
+from lsu_mesh.mesh.estimation.transfer import Transfer
 from lsu_mesh.mesh.messages import Bounds, Measurement, Posterior, Prediction, Reference, Suggestion
-from lsu_mesh.mesh.nodes.adoption import adopted_model, is_due, make_engine
-from lsu_mesh.mesh.nodes.contradiction import update_without_contradicting_strips, widen
-from lsu_mesh.mesh.nodes.described import described, described_box, finite_or_none, foretold
-from lsu_mesh.mesh.nodes.reach import Reach
-from lsu_mesh.mesh.nodes.transfer import Transfer
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
-from lsu_mesh.mesh.verification.course import Brought, course
+from lsu_mesh.mesh.verification.provenance_steps import Brought, course
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Vector
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 import rerun as rr
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, written
 
 from lsu_mesh.mesh.config import Configuration
-from services.recording.made_up_mesh import START_NS, Arrival, written
-from services.recording.recorder import Recorder
 
 
 @pytest.fixture(autouse=True)

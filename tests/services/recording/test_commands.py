@@ -9,15 +9,16 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 from local_mesh import LocalMesh
+from lsu_mesh_services.cli import main
+from lsu_mesh_services.exit_codes import FAILURE, OK, USAGE
+from lsu_mesh_services.recording.read import read_raw
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.stream import next_part
+from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh, written
 from recorded_mesh import record
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Measurement
-from services.cli import FAILURE, OK, USAGE, main
-from services.recording.made_up_mesh import MadeUpMesh, written
-from services.recording.read import read_raw
-from services.recording.recorder import Recorder
-from services.recording.stream import next_part
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 
 import pytest
-
-from services.cli import OK, main
-from services.recording.cost import measure
+from lsu_mesh_services.cli import main
+from lsu_mesh_services.exit_codes import OK
+from lsu_mesh_services.recording.cost import measure
 
 
 def test_batches_cost_a_fraction_and_lose_nothing() -> None:

@@ -12,20 +12,19 @@ import pytest
 from headless_viewer import HeadlessViewer, why_not
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from services.recording.made_up_mesh import MadeUpMesh, written
-from services.recording.mend import mend
-from services.recording.read import read_raw
-from services.recording.recorder import Recorder
-from services.recording.stream import next_part
+from lsu_mesh_services.recording.read import read_raw
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.repair import mend
+from lsu_mesh_services.recording.stream import next_part
+from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh, written
 
 WRITER = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from services.recording.made_up_mesh import MadeUpMesh
+from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh
 from lsu_mesh.mesh.config import load
-from services.recording.recorder import Recorder
+from lsu_mesh_services.recording.recorder import Recorder
 recorder = Recorder(load(Path(sys.argv[2])), Path(sys.argv[3]))
 mesh, told = MadeUpMesh(load(Path(sys.argv[2]))), 0
 for k in range(1, 100000):

@@ -9,11 +9,10 @@ import pytest
 import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
-
-from services.recording.frame import READABLE, Frame, readable_scale
-from services.recording.made_up_mesh import written
-from services.recording.names import Names
-from services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.entity_paths import Names
+from lsu_mesh_services.recording.frame import READABLE, Frame, readable_scale
+from lsu_mesh_services.recording.synthetic_mesh import written
+from lsu_mesh_services.recording.timeline import Moment, Timelines
 
 
 @given(st.lists(st.floats(1e-12, 1e12), min_size=1, max_size=3))

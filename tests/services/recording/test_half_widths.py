@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 from local_mesh import LocalMesh
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh, written
 from msgspec import structs
 from recorded_mesh import record
 from rerun.chunk import RrdReader
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Suggestion, encode
-from services.recording.made_up_mesh import MadeUpMesh, written
-from services.recording.recorder import Recorder
 
 STEPS = 60
 

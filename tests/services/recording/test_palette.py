@@ -6,10 +6,9 @@ import itertools
 from pathlib import Path
 
 import pytest
-
-from services.recording import palette
-from services.recording.made_up_mesh import written
-from services.recording.palette import Color
+from lsu_mesh_services.recording import palette
+from lsu_mesh_services.recording.palette import Color
+from lsu_mesh_services.recording.synthetic_mesh import written
 
 EVERY = [palette.TRUTH, palette.OTHER, *palette.FUSIONS, *palette.FILTERS]
 

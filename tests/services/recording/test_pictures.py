@@ -9,12 +9,12 @@ import pytest
 from flights import convert_module, flight
 from headless_viewer import HeadlessViewer, why_not
 from local_mesh import LocalMesh
+from lsu_mesh_services.recording.palette import TRUST, TRUTH, colors
+from lsu_mesh_services.recording.recorder import Recorder
 from pixels import Area, pixels
 
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.messages import Posterior, Prediction, encode
-from services.recording.palette import TRUST, TRUTH, colors
-from services.recording.recorder import Recorder
 
 pytestmark = [
     pytest.mark.viewer,
@@ -106,7 +106,7 @@ def viewer() -> Iterator[HeadlessViewer]:
 def configuration_of(run: str, root: Path, folder: Path) -> Configuration:
     """The mesh of one of the runs."""
     if run == "demo":
-        return load(root / "services" / "demo.toml", ["mesh.steps=120"])
+        return load(root / "services" / "lsu_mesh_services" / "demo.toml", ["mesh.steps=120"])
     if run == "liar":
         return load(root / "examples" / "liar.toml", ["mesh.steps=120", LIE])
     if run == "flight":

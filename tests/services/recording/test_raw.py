@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from lsu_mesh_services.recording.read import RawMessage, read_raw
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, MadeUpMesh, written
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import decode
-from services.recording.made_up_mesh import START_NS, Arrival, MadeUpMesh, written
-from services.recording.read import RawMessage, read_raw
-from services.recording.recorder import Recorder
 
 Record = Callable[[Configuration, Sequence[Arrival]], Path]
 

@@ -16,6 +16,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lsu_mesh_services.recording.read import read_raw
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.repair import mend
+from lsu_mesh_services.recording.set_geometry import Body, body
+from lsu_mesh_services.recording.stream import next_part
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, STEP_NS, Arrival, MadeUpMesh, written
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
@@ -24,12 +30,6 @@ from lsu_mesh.mesh.messages import Event, Fused, Health, Measurement, Posterior,
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
-from services.recording.body import Body, body
-from services.recording.made_up_mesh import START_NS, STEP_NS, Arrival, MadeUpMesh, written
-from services.recording.mend import mend
-from services.recording.read import read_raw
-from services.recording.recorder import Recorder
-from services.recording.stream import next_part
 
 Record = Callable[[Configuration, Sequence[Arrival]], Path]
 
@@ -316,7 +316,7 @@ def test_a_set_that_cannot_be_drawn_leaves_the_others_be(
         return body(support)
 
     recorder = Recorder(configuration, tmp_path / "x.rrd")
-    monkeypatch.setattr("services.recording.space.body", unlucky)
+    monkeypatch.setattr("lsu_mesh_services.recording.sets_3d.body", unlucky)
     for arrival in MadeUpMesh(configuration).run(3):
         recorder.record(*arrival)
     recorder.close()

@@ -10,14 +10,14 @@ import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 from headless_viewer import HeadlessViewer, free_port, why_not
+from lsu_mesh_services.recording.palette import TRUTH, colors
+from lsu_mesh_services.recording.read import read_raw
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, STEP_NS, MadeUpMesh, written
 from pixels import Area, pixels
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Event
-from services.recording.made_up_mesh import START_NS, STEP_NS, MadeUpMesh, written
-from services.recording.palette import TRUTH, colors
-from services.recording.read import read_raw
-from services.recording.recorder import Recorder
 
 pytestmark = [
     pytest.mark.viewer,

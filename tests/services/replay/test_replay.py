@@ -9,12 +9,13 @@ from typing import Any
 
 import pytest
 from local_mesh import LocalMesh
+from lsu_mesh_services.cli import main
+from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
+from lsu_mesh_services.recording.read import parts, read_recording
 from recorded_mesh import record
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Measurement, Message, Posterior
-from services.cli import NOT_MET, OK, USAGE, main
-from services.recording.read import parts, read_recording
 
 Run = Callable[..., tuple[int, list[dict[str, Any]], str]]
 

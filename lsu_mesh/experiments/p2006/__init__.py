@@ -1,0 +1,1 @@
+"""Pavelková, Kárný 2006: off-line and sliding-window MAP estimates."""

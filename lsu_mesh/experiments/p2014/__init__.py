@@ -1,0 +1,1 @@
+"""Pavelková, Kárný 2014: joint estimation of states and parameters."""

@@ -1,0 +1,1 @@
+"""Kuklišová Pavelková 2023: LSU-CZ on constrained zonotopes."""

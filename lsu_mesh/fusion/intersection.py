@@ -1,0 +1,46 @@
+"""The intersection of supports of one step, exact before it is squeezed into one class."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lsu_mesh.errors import InconsistentData
+from lsu_mesh.supports.arrays import frozen
+from lsu_mesh.supports.intersection import Intersection
+from lsu_mesh.supports.support import Support
+
+Vector = NDArray[np.float64]
+
+
+class Fusion(NamedTuple):
+    """What the sources know together.
+
+    ``support`` holds the state; ``bounds`` (lower, upper) is its interval hull met with the bounds of every accepted
+    source; ``point`` is the centre of the bounds; ``rejected`` are indices of sources that were left out.
+    """
+
+    support: Support
+    bounds: tuple[Vector, Vector]
+    point: Vector
+    rejected: tuple[int, ...]
+
+
+def fuse_all(supports: Sequence[Support]) -> Fusion:
+    """``∩ supports``; a single source keeps its class. ``InconsistentData`` where it is proved empty."""
+    joint = Intersection(supports)
+    try:
+        lower, upper = joint.bounds()
+    except InconsistentData as error:
+        raise InconsistentData("the supports are proved to have no common point") from error
+    support = supports[0] if len(supports) == 1 else joint.to_constrained_zonotope()
+    return Fusion(support, (lower, upper), frozen(0.5 * lower + 0.5 * upper), ())
+
+
+def meet_bounds(supports: Sequence[Support]) -> tuple[Vector, Vector]:
+    """``(max of the lower, min of the upper)`` bounds, (n,) each, exact; they may cross."""
+    bounds = [support.bounds() for support in supports]
+    return np.max([low for low, _ in bounds], axis=0), np.min([high for _, high in bounds], axis=0)

@@ -1,0 +1,122 @@
+"""Whole runs of whole banks of independent filters, over the step of ``kernels/step.py``."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lsu_mesh.kernels.filter_step import MEET_BOX, PREDICT, UPDATE, advance, copy, describe, predict_output
+from lsu_mesh.kernels.runtime.compile import inlined, kernel
+from lsu_mesh.kernels.runtime.scratch import Scratch, spare_state
+from lsu_mesh.kernels.runtime.unowned_views import borrowed
+
+Matrix = NDArray[np.float64]
+Vector = NDArray[np.float64]
+Stack = NDArray[np.float64]
+
+DONE = 0
+IN_UPDATE = 1
+IN_PREDICT = 2
+
+
+class Models(NamedTuple):
+    """Models of a bank: A (M, n, n), B (M, n, p), C (M, m, n), G (M, n, q), widths (M, q), r (M, m), domains (M, 2, n).
+
+    M = N, or M = 1 for all instances alike; domains (M, 0, n) where there is none.
+    """
+
+    A: Stack
+    B: Stack
+    C: Stack
+    G: Stack
+    widths: Matrix
+    r: Matrix
+    domains: Stack
+
+
+class Record(NamedTuple):
+    """What a run stores: points, lower, upper (N, T, n), volumes (N, T), y_lower, y_upper, y_points (N, T, m)."""
+
+    points: Stack
+    lower: Stack
+    upper: Stack
+    volumes: Matrix
+    y_lower: Stack
+    y_upper: Stack
+    y_points: Stack
+
+
+@kernel
+def sweep(
+    family: int, option: int, updating: bool, last_prediction: bool, states: Stack, spare: Matrix, models: Models,
+    Y: Stack, U: Stack, record: Record, outcome: NDArray[np.int64], first: int, last: int, work: Scratch,
+) -> None:  # fmt: skip
+    """Rows 1 … T of the instances first … last − 1, whose states (N, rows, n) go from the prior to the last one.
+
+    Each row: predict the output, update with ``Y[i, k]``, record (all three only where ``updating``); then, but after
+    the last row only with ``last_prediction``, predict with ``U[i, k]``. ``outcome`` (N, 2): the rows that are done,
+    and ``DONE`` or where it stopped: ``IN_UPDATE`` (the state is the prediction of that row) or ``IN_PREDICT`` (the
+    state is the posterior of the row before). Y (N, T, m), U (N, T, p); spare (rows, n) and work are scratch.
+    """
+    rows = Y.shape[1]
+    models, record, work = _borrow_models(models), _borrow_record(record), borrowed(work)
+    states, spare, Y, U = borrowed(states), borrowed(spare), borrowed(Y), borrowed(U)
+    bounded = models.domains.shape[1] > 0
+    for i in range(first, last):
+        j = i % models.A.shape[0]
+        A, B, C, G = models.A[j], models.B[j], models.C[j], models.G[j]
+        widths, r, S = models.widths[j], models.r[j], states[i]
+        met = spare_state(work, S.shape[1], S.shape[0])
+        outcome[i, 0], outcome[i, 1] = rows, DONE
+        # three actions a row through one call of advance: each further call would double the time of compiling
+        for turn in range(3 * rows):
+            k, action = turn // 3, turn % 3
+            after_last = k + 1 == rows and not last_prediction
+            if (action == UPDATE and not updating) or (action != UPDATE and after_last):
+                continue
+            source, target, low, high = S, spare, Y[i, k], r
+            if action == UPDATE:
+                predict_output(family, S, C, r, record.y_lower[i, k], record.y_upper[i, k], record.y_points[i, k], work)
+            elif action == MEET_BOX:
+                if not bounded:
+                    continue
+                source, target, low, high = spare, met, models.domains[j, 0], models.domains[j, 1]
+            status = advance(action, family, option, source, C, low, high, A, B, U[i, k], G, widths, target, work)
+            if status != 0:
+                outcome[i, 0] = k if action == UPDATE else k + 1
+                outcome[i, 1] = IN_UPDATE if action == UPDATE else IN_PREDICT
+                break
+            if action != PREDICT or not bounded:
+                copy(target, S)
+            if action == UPDATE:
+                record.volumes[i, k] = describe(
+                    family, S, record.points[i, k], record.lower[i, k], record.upper[i, k], work
+                )
+
+
+@inlined
+def _borrow_models(m: Models) -> Models:
+    return Models(
+        borrowed(m.A),
+        borrowed(m.B),
+        borrowed(m.C),
+        borrowed(m.G),
+        borrowed(m.widths),
+        borrowed(m.r),
+        borrowed(m.domains),
+    )
+
+
+@inlined
+def _borrow_record(r: Record) -> Record:
+    return Record(
+        borrowed(r.points),
+        borrowed(r.lower),
+        borrowed(r.upper),
+        borrowed(r.volumes),
+        borrowed(r.y_lower),
+        borrowed(r.y_upper),
+        borrowed(r.y_points),
+    )

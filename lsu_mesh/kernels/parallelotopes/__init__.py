@@ -1,0 +1,1 @@
+"""Boxes, parallelotopes and bundles: strip update, time update, enclosure, choice of edges."""

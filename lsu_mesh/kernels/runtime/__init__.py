@@ -1,0 +1,1 @@
+"""What all kernels share: compilation, rounding, scaling, small linear algebra, scratch memory."""

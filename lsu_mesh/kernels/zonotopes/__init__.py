@@ -1,0 +1,1 @@
+"""Zonotopes and constrained zonotopes: arithmetic, time update, reduction, the zonotopic Kalman step."""

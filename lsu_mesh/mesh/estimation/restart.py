@@ -1,0 +1,109 @@
+"""Sound sets from which a filter can start again in the middle of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lsu_mesh.errors import InconsistentData, UnboundedSupport
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.mesh.estimation.epochs import Epochs
+from lsu_mesh.mesh.estimation.inconsistency import explains
+from lsu_mesh.mesh.estimation.step_record import Base
+from lsu_mesh.mesh.estimation.transfer import OLDEST_BOX, SOUND
+from lsu_mesh.mesh.messages import Fused, Input, Reference
+from lsu_mesh.mesh.sets import to_support
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.support import Vector
+
+
+@dataclass(frozen=True)
+class Start:
+    """A sound set to start again from."""
+
+    set: object
+    """Snapshot of the engine that holds it."""
+    base: Base
+    words: str
+    used: Sequence[Reference] = ()
+    message: Fused | None = None
+
+    @property
+    def guarantee(self) -> str:
+        return "declared" if self.message is None else self.message.guarantee
+
+
+class Starts:
+    """Remembers the newest sound set of each fusion, and finds one that meets the data."""
+
+    def __init__(self, epochs: Epochs) -> None:
+        self._epochs = epochs
+        self._fused: dict[str, Fused] = {}
+
+    def note(self, message: Fused) -> None:
+        """Remember a fused set if it is sound and not older than the known one."""
+        known = self._fused.get(message.name)
+        if message.status in SOUND and (known is None or message.step >= known.step):
+            self._fused[message.name] = message
+
+    def forget(self) -> None:
+        """What is known rests on bounds that are no longer believed."""
+        self._fused.clear()
+
+    def find(
+        self, engine: Filter, k: int, y: Vector, reach: Orthotope | None, inputs: Mapping[int, Input], *, abandons: bool
+    ) -> Start | None:
+        """A set of step k, before its data y (m,), that is sound and meets them; ``None`` where there is none.
+
+        In this order: a fused set carried forward, if it does not descend from the epoch that is left (``abandons``);
+        the prior carried through every input (``reach``); the domain. Sets with a declared guarantee come first. The
+        engine is only borrowed.
+        """
+        before = engine.snapshot()
+        newest_first = sorted(self._fused.values(), key=lambda fused: -fused.step)
+        carried_on = (self._carried(engine, fused, k, inputs, abandons) for fused in newest_first)
+        starts = [start for start in carried_on if start is not None]
+        if reach is not None:
+            starts.append(_made(engine, reach, "reach", "the prior carried through all inputs"))
+        if engine.model.domain is not None:
+            starts.append(_made(engine, engine.model.domain, "domain", "the domain"))
+        starts.sort(key=lambda start: start.guarantee != "declared")
+        met = None
+        for start in starts:
+            engine.restore(start.set)
+            if explains(engine, y):
+                met = start
+                break
+        engine.restore(before)
+        return met
+
+    def _carried(
+        self, engine: Filter, fused: Fused, k: int, inputs: Mapping[int, Input], abandons: bool
+    ) -> Start | None:
+        """A fused set of step k or before, carried to step k."""
+        if not k - OLDEST_BOX <= fused.step <= k or self._epochs.is_abandoned(fused):
+            return None
+        if abandons and self._epochs.is_descendant(fused):
+            return None
+        used: list[Reference] = []
+        try:
+            engine.reset(to_support(fused.support))
+        except InconsistentData:  # it is empty: whoever sent it was wrong
+            return None
+        for j in range(fused.step, k):
+            u = inputs.get(j)
+            if engine.model.input_count and u is None:
+                return None
+            try:
+                engine.predict(None if u is None else np.array(u.u))
+            except (InconsistentData, UnboundedSupport):
+                return None
+            used += [] if u is None else [u.reference]
+        return Start(engine.snapshot(), fused.reference, f"the fused set of step {fused.step}", used, fused)
+
+
+def _made(engine: Filter, support: Orthotope, base: Base, words: str) -> Start:
+    engine.reset(support)
+    return Start(engine.snapshot(), base, words)

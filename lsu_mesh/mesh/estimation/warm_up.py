@@ -1,0 +1,48 @@
+"""A few steps that count for nothing, so that a peer compiles and loads nothing when data come."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+
+from lsu_mesh.errors import InconsistentData, UnboundedSupport
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.mesh.estimation.open_loop import Reach
+from lsu_mesh.mesh.sets import to_message
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.parallelotope import Parallelotope
+
+REHEARSED_STEPS = 6
+"""So many steps bring a limited complexity into play."""
+
+
+def rehearse(engine: Filter, input_box: Orthotope | None) -> None:
+    """Do everything that a node asks of its filter; the filter is left as it was."""
+    before, reach = engine.snapshot(), Reach(engine.model)
+    reach.begin(engine.support.interval_hull())
+    with suppress(InconsistentData, UnboundedSupport):  # without the real inputs a state may leave its domain
+        for number in range(REHEARSED_STEPS):
+            _rehearse_step(engine, reach, input_box if number % 2 else None, starts=number % 3 == 2)
+    engine.restore(before)
+
+
+def _rehearse_step(engine: Filter, reach: Reach, input_box: Orthotope | None, *, starts: bool) -> None:
+    model = engine.model
+    if model.output_count:
+        engine.update(engine.predict_output().point)
+    hull = engine.support.interval_hull()
+    around = Parallelotope(hull.center, np.diag(np.maximum(hull.half_widths, 1.0)))
+    across = Parallelotope(hull.center, 0.5 * around.generators @ np.triu(np.ones_like(around.generators)))
+    for other in (around, hull, engine.support, across):
+        with suppress(InconsistentData):  # the centre of a hull need not be in the set
+            engine.condition(other)
+        if starts:
+            engine.reset(other)
+    to_message(engine.support)
+    engine.bounds()
+    u = None
+    if model.input_count:
+        u = np.zeros(model.input_count) if input_box is None else input_box
+    engine.predict(u)
+    reach.predict(u)

@@ -1,0 +1,67 @@
+"""A message of every topic, for documentation and tests: ``python -m lsu_mesh.mesh.message_examples``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from lsu_mesh.mesh.messages import TYPES, VERSION, Bounds, Message, OrthotopeMessage, Rejection
+
+
+def example(topic: str) -> Message:
+    """A message of a topic, for documentation and tests."""
+    common: dict[str, Any] = {
+        "v": VERSION, "src": "filter/box", "boot": "0123456789abcdef", "seq": 41, "step": 42,
+        "sent_ns": 1_700_000_000_020_000_000, "origin_ns": 1_700_000_000_018_000_000, "model": "b015983c54e6e4d2",
+    }  # fmt: skip
+    box = OrthotopeMessage(lower=[-0.25, 0.5], upper=[0.75, 1.0])
+    bounds: dict[str, Any] = {"lower": box.lower, "upper": box.upper}
+    estimate: dict[str, Any] = bounds | {
+        "kind": "LSUO", "support": box, "point": [0.25, 0.75], "log_volume": -0.6931471805599453,
+        "volume_of": "support", "status": "ok", "revision": 0, "epoch": 0, "guarantee": "declared",
+        "base": ("posterior", "filter/box", "0123456789abcdef", 40),
+        "used": [
+            ("input", "plant/plant", "0011223344556677", 40),
+            ("measurement", "sensor/s1", "8899aabbccddeeff", 41),
+        ],
+        "bounds": Bounds(rho=[0.1, 0.1], r=[0.3]), "missing": ["s2"],
+    }  # fmt: skip
+    own: dict[str, dict[str, Any]] = {
+        "truth": {"x": [0.1, 0.8]},
+        "input": {"u": [0.4]},
+        "measurement": {"y": [0.7, None], "time_ns": 840_000_000},
+        "prediction": bounds
+        | {"support": box, "y_lower": [-0.3], "y_upper": [1.1], "y_point": [0.4], "epoch": 0, "guarantee": "declared"},
+        "posterior": estimate,
+        "fused": estimate
+        | {
+            "policy": "relaxed",
+            "faults": 1,
+            "quarantined": [],
+            "rejected": [Rejection(source="cz", reason="disjoint")],
+        },
+        "bounds": {
+            "rho": [0.1, 0.1],
+            "r": {"s1": [0.36]},
+            "factor": 2.0,
+            "margin": 1.2,
+            "first": 1,
+            "last": 42,
+            "explained": False,
+            "adopt_at": 62,
+        },
+        "health": {"role": "filter", "level": "OK", "reasons": [], "counters": {"received": 84.0, "gaps": 0.0}},
+        "event": {
+            "level": "WARN",
+            "code": "contradiction",
+            "text": "step 42: …",
+            "about": {"sensor": "s1", "gap": 0.2},
+        },
+    }
+    return TYPES[topic](**common, **own[topic])
+
+
+if __name__ == "__main__":
+    for _topic in TYPES:
+        print(f"{_topic}: {msgspec.json.encode(example(_topic)).decode()}")

@@ -1,0 +1,291 @@
+"""The Zenoh session of a peer; the only file that imports zenoh.
+
+Peers with gossip and without multicast; every peer listens somewhere, because peers do not relay for one another.
+Advanced publishers keep a cache and a heartbeat, advanced subscribers recover what they missed; congestion drops (and
+is recovered), it never blocks. Callbacks only stamp the arrival and put into a bounded queue.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Any, Self
+
+import zenoh
+from zenoh import ext
+
+from lsu_mesh_services.network.link_repair import Reunion
+from lsu_mesh_services.network.receive_queue import Arrival, Arrivals
+from lsu_mesh_services.network.security import Certificates
+
+LEASE_MS = 2000
+HEARTBEAT_S = 0.1
+SETTLED_S, LONGEST_INTRODUCTION_S = 0.5, 5.0
+"""A second session leaves the mesh when its links have not changed for so long, and after so long in any case. One that
+is closed while it opens links leaves them open, for as long as its process lives."""
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """How to reach the mesh; ``zenoh`` holds further ``path=value`` settings of Zenoh itself."""
+
+    connect: Sequence[str] = ()
+    listen: Sequence[str] = ("tcp/127.0.0.1:0",)
+    mode: str = "peer"
+    cache: int = 256
+    multicast: bool = False
+    zenoh: Sequence[str] = ()
+    certificates: Certificates | None = None
+
+
+class NoSession(Exception):
+    """The session could not be opened; the message says what to do."""
+
+
+class Clock:
+    """Nanoseconds since 1970 that never go back: the wall clock at the start plus the monotonic clock since."""
+
+    def __init__(self) -> None:
+        self._offset = time.time_ns() - time.monotonic_ns()
+
+    def now(self) -> int:
+        """The time now."""
+        return self._offset + time.monotonic_ns()
+
+
+class Bus:
+    """A session with queued arrivals. Use it as a context manager."""
+
+    def __init__(self, settings: SessionSettings, clock: Clock) -> None:
+        self._settings = settings
+        self._clock = clock
+        self._arrivals = Arrivals()
+        self._publishers: dict[str, Any] = {}
+        self._declared: list[Any] = []
+        self._own_tokens: set[str] = set()
+        self._reunion: Reunion | None = None
+        try:
+            self._session = zenoh.open(_zenoh_configuration(settings))
+        except zenoh.ZError as error:
+            raise NoSession(_explained(settings, str(error))) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def publish(self, key: str, payload: bytes, encoding: str) -> None:
+        """Send to everyone who subscribes, now or soon (the cache serves late joiners)."""
+        self.announce(key)
+        self._publishers[key].put(payload, encoding=encoding)
+
+    def announce(self, key: str) -> None:
+        """Declare the publisher of a key, so that subscribers know it before the first message."""
+        if key not in self._publishers:
+            self._publishers[key] = self._declare_publisher(key)
+
+    def _declare_publisher(self, key: str) -> Any:
+        return ext.declare_advanced_publisher(
+            self._session,
+            key,
+            congestion_control=zenoh.CongestionControl.DROP,
+            allowed_destination=zenoh.Locality.REMOTE,
+            cache=ext.CacheConfig(self._settings.cache),
+            publisher_detection=True,
+            sample_miss_detection=ext.MissDetectionConfig(heartbeat=HEARTBEAT_S, sporadic_heartbeat=None),
+        )
+
+    def subscribe(self, key: str) -> None:
+        """Queue what is and was (as far as caches reach) published under a key expression."""
+        self._declared.append(
+            ext.declare_advanced_subscriber(
+                self._session,
+                key,
+                self._enqueue_sample,
+                history=ext.HistoryConfig(detect_late_publishers=True, max_samples=self._settings.cache),
+                recovery=ext.RecoveryConfig(heartbeat=True, periodic_queries=None),
+            )
+        )
+
+    def subscribe_live(self, key: str) -> None:
+        """Queue what is published from now on under a key expression; what is missed stays missing."""
+        self._declared.append(self._session.declare_subscriber(key, self._enqueue_sample))
+
+    def _enqueue_sample(self, sample: Any) -> None:
+        self._arrivals.put(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
+
+    def declare_alive(self, key: str) -> None:
+        """Show that this process is there, for as long as it is."""
+        self._own_tokens.add(key)
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def watch_alive(self, key: str) -> None:
+        """Queue who is there and who comes and goes, and look for those that only this session does not see."""
+        if self._settings.mode == "peer" and self._settings.connect and self._reunion is None:
+            self._reunion = Reunion(lambda: self._alive_elsewhere(key), self._introduce)
+
+        def changed(sample: Any) -> None:
+            is_there = sample.kind == zenoh.SampleKind.PUT
+            self._arrivals.put(Arrival("alive" if is_there else "gone", str(sample.key_expr), b"", self._clock.now()))
+            if self._reunion is not None:
+                self._reunion.note(str(sample.key_expr), is_there)
+
+        self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
+
+    def _alive_elsewhere(self, key: str) -> set[str] | None:
+        """Tokens that an entry of the mesh knows, without the own ones; None where it may not tell of others'."""
+        if self._settings.certificates is not None and self._settings.certificates.access_control is not None:
+            return None
+        configuration = _zenoh_configuration(replace(self._settings, mode="client", listen=()))
+        configuration.insert_json5("connect/timeout_ms", "1000")
+        configuration.insert_json5("connect/exit_on_failure", "true")
+        try:
+            with zenoh.open(configuration) as session:
+                replies = session.liveliness().get(key, timeout=1.0)
+                return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None} - self._own_tokens
+        except zenoh.ZError:
+            return set()
+
+    def _introduce(self, is_over: Callable[[], bool]) -> None:
+        """Join the mesh once more, linked to everybody, for a moment."""
+        configuration = _zenoh_configuration(replace(self._settings, listen=()))
+        strategy = {"peer": {"to_router": "always", "to_peer": "always"}}
+        configuration.insert_json5("scouting/gossip/autoconnect_strategy", json.dumps(strategy))
+        configuration.insert_json5("connect/timeout_ms", "1000")
+        try:
+            with zenoh.open(configuration) as session:
+                begin = changed = time.monotonic()
+                links: set[str] = set()
+                while (now := time.monotonic()) < begin + LONGEST_INTRODUCTION_S:
+                    found = {str(peer) for peer in session.info.peers_zid()}
+                    if found != links:
+                        links, changed = found, now
+                    if now > changed + SETTLED_S and is_over():
+                        return
+                    time.sleep(0.05)
+        except zenoh.ZError:
+            return
+
+    def ask(self, key: str) -> None:
+        """Query a key; the answers are queued as samples when they come."""
+
+        def answered(reply: Any) -> None:
+            if reply.ok is not None:
+                self._enqueue_sample(reply.ok)
+
+        self._session.get(key, answered, timeout=2.0)
+
+    def ask_cache(self, key: str) -> None:
+        """Ask the publisher of a key for all that its cache holds; it is queued as samples."""
+
+        def answered(reply: Any) -> None:
+            if reply.ok is not None:
+                self._enqueue_sample(reply.ok)
+
+        selector = f"{key}/@adv/**?_anyke;_max={self._settings.cache}"
+        self._session.get(selector, answered, consolidation=zenoh.ConsolidationMode.NONE, timeout=5.0)
+
+    def answer(self, key: str, answers: Callable[[], tuple[str, bytes, str] | None]) -> None:
+        """Answer queries on ``key`` with ``(key, payload, encoding)``."""
+
+        def reply(query: Any) -> None:
+            with query:
+                found = answers()
+                if found is not None:
+                    query.reply(found[0], found[1], encoding=found[2])
+
+        self._declared.append(self._session.declare_queryable(key, reply))
+
+    def links(self) -> int:
+        """How many peers and routers this session is connected to."""
+        info = self._session.info
+        return len(info.peers_zid()) + len(info.routers_zid())
+
+    def next(self, timeout: float) -> Arrival | None:
+        """The next arrival, or None after ``timeout`` seconds; 0 does not wait."""
+        return self._arrivals.next(timeout)
+
+    def waiting(self) -> int:
+        """Arrivals in the queue."""
+        return len(self._arrivals)
+
+    @property
+    def dropped(self) -> int:
+        """Samples that found the queue full."""
+        return self._arrivals.dropped
+
+    def close(self) -> None:
+        """Undeclare everything and close; errors of a lost link do not matter any more."""
+        if self._reunion is not None:
+            self._reunion.close()
+        for declared in [*reversed(self._declared), *self._publishers.values()]:
+            try:
+                declared.undeclare()
+            except zenoh.ZError:
+                continue
+        self._declared.clear()
+        self._publishers.clear()
+        try:
+            self._session.close()  # type: ignore[no-untyped-call]
+        except zenoh.ZError:
+            return
+
+
+def _zenoh_configuration(settings: SessionSettings) -> Any:
+    retry = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2}
+    values: dict[str, object] = {
+        "mode": settings.mode,
+        "scouting/multicast/enabled": settings.multicast,
+        "scouting/gossip/enabled": True,
+        "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
+        "connect/endpoints": list(settings.connect),
+        "connect/timeout_ms": -1,
+        "connect/exit_on_failure": False,
+        "connect/retry": retry,
+        "listen/endpoints": list(settings.listen),
+        "transport/link/tx/lease": LEASE_MS,
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": 500_000,
+        "transport/shared_memory/enabled": False,
+        "timestamping/enabled": True,
+        "adminspace/enabled": True,
+    }
+    values |= {} if settings.certificates is None else _security(settings.certificates)
+    configuration = zenoh.Config()
+    for path, value in values.items():
+        configuration.insert_json5(path, json.dumps(value))
+    for item in settings.zenoh:
+        path, _, text = item.partition(":" if ":" in item.partition("=")[0] else "=")
+        configuration.insert_json5(path, text)
+    return configuration
+
+
+def _security(files: Certificates) -> dict[str, object]:
+    """Encrypted links only; both ends show a certificate, and the rules say what its name may do."""
+    tls = {
+        "root_ca_certificate": str(files.authority),
+        "listen_certificate": str(files.certificate),
+        "listen_private_key": str(files.key),
+        "connect_certificate": str(files.certificate),
+        "connect_private_key": str(files.key),
+        "enable_mtls": True,
+        "verify_name_on_connect": files.verify_hosts,
+        "close_link_on_expiration": True,
+    }
+    values: dict[str, object] = {"transport/link/tls": tls, "transport/link/protocols": ["tls", "quic"]}
+    return values if files.access_control is None else {**values, "access_control": files.access_control}
+
+
+def _explained(settings: SessionSettings, error: str) -> str:
+    if "in use" in error.lower() or "listen" in error.lower():
+        listened = ", ".join(settings.listen)
+        return (
+            f"cannot listen on {listened}: {error}\n"
+            'Another process holds the port; stop it, or choose another one with -X network.entry="tcp/127.0.0.1:PORT"'
+        )
+    return f"no Zenoh session: {error}"

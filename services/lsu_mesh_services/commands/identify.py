@@ -1,0 +1,136 @@
+"""``lsu-mesh identify``: bounds that explain the data of a configuration's files, or of a recording."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lsu_mesh.errors import LsuMeshError
+from lsu_mesh.identification import Explanation, explain, report
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.config.measurement_files import read_playback
+from lsu_mesh.mesh.config.table import nearest
+from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
+from lsu_mesh_services.configuration import load_or_explain, print_warnings
+from lsu_mesh_services.exit_codes import FAILURE, NOT_MET, OK, USAGE
+
+Matrix = NDArray[np.float64]
+Rows = Mapping[int, Iterable[float | None]]
+
+
+class NoData(LsuMeshError):
+    """There is nothing to explain; the text says what is missing."""
+
+
+def main(options: argparse.Namespace) -> int:
+    configuration = load_or_explain(options.file, options)
+    if configuration is None:
+        return USAGE
+    print_warnings(configuration)
+    unknown_sensors = [name for name in options.sensors or () if name not in configuration.sensors]
+    if unknown_sensors:
+        known = nearest(unknown_sensors[0], configuration.sensors)
+        print(f"{options.file}: there is no sensor {unknown_sensors[0]!r}; {known}", file=sys.stderr)
+        return USAGE
+    try:
+        names, Y, U, first = _data(configuration, options)
+        found = explain(
+            configuration.model(names), Y, U, learn=options.learn, margin=options.margin, share=options.share,
+            unknown=[text.split(",") for text in options.unknown],
+        )  # fmt: skip
+    except (LsuMeshError, OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return FAILURE if not isinstance(error, NoData) else USAGE
+    print(json.dumps(_record(found, first)) if options.json else _words(found, names, first))
+    return OK if found.held_out is None or found.held_out.is_explained else NOT_MET
+
+
+def _data(
+    configuration: Configuration, options: argparse.Namespace
+) -> tuple[list[str], Matrix, Matrix | None, int]:  # fmt: skip
+    """Names of the sensors, outputs (T, m), inputs (T − 1, p), and the step of the first row."""
+    measured, inputs = _recorded(options.recording) if options.recording else (_played(configuration), {})
+    names = [name for name in sorted(configuration.sensors) if name in measured]
+    names = [name for name in names if options.sensors is None or name in options.sensors]
+    if not names:
+        raise NoData(f"{options.file}: no sensor has data: none plays a file; give a recording by --recording FILE.rrd")
+    first = min(min(measured[name]) for name in names)
+    last = max(max(measured[name]) for name in names)
+    columns = []
+    for name in names:
+        block = np.full((last - first + 1, len(configuration.sensors[name].C)), np.nan)
+        for step, values in measured[name].items():
+            block[step - first] = [np.nan if value is None else value for value in values]
+        columns.append(block)
+    if not configuration.base_model.input_count:
+        return names, np.hstack(columns), None, first
+    missing = [step for step in range(first, last) if step not in inputs]
+    if missing:
+        raise NoData(f"{options.file}: the model has inputs, and the input of step {missing[0]} is not in the data")
+    U = np.array([list(inputs[step]) for step in range(first, last)], dtype=np.float64)
+    return names, np.hstack(columns), U, first
+
+
+def _played(configuration: Configuration) -> dict[str, Rows]:
+    """Values by step of each sensor that plays a file."""
+    mesh, played = configuration.mesh, {}
+    for name, sensor in configuration.sensors.items():
+        if sensor.file is not None:
+            rows = read_playback(sensor.file, mesh.dt, mesh.start_time)
+            played[name] = {int(step): list(values) for step, values in zip(rows.steps, rows.values, strict=True)}
+    return {name: rows for name, rows in played.items() if rows}
+
+
+def _recorded(path: str) -> tuple[dict[str, Rows], Rows]:
+    """Measurements by sensor and step, and inputs by step; the first of each counts."""
+    from lsu_mesh_services.recording.read import read_raw
+
+    measured: dict[str, dict[int, list[float | None]]] = {}
+    inputs: dict[int, list[float | None]] = {}
+    for raw in read_raw(Path(path)):
+        message = _decoded(raw.key, raw.payload)
+        if isinstance(message, Measurement):
+            measured.setdefault(message.name, {}).setdefault(message.step, message.y)
+        elif isinstance(message, Input):
+            inputs.setdefault(message.step, list(message.u))
+    return dict(measured), inputs
+
+
+def _decoded(key: str, payload: bytes) -> Message | None:
+    address = parse(key)
+    try:
+        return None if address is None else decode(address.topic, payload)
+    except Refused:
+        return None
+
+
+def _words(found: Explanation, names: list[str], first: int) -> str:
+    note = f"rows are steps from {first}" if first != 1 else ""
+    head = f"sensors {', '.join(names)}{'; ' + note if note else ''}"
+    return f"{head}\n{report(found)}"
+
+
+def _record(found: Explanation, first: int) -> dict[str, Any]:
+    held = found.held_out
+    return {
+        "first_step": first, "rows_used": [found.first, found.last], "learn": found.learn, "margin": found.margin,
+        "factor": None if math.isnan(found.factor) else found.factor, "rho": found.rho.tolist(), "r": found.r.tolist(),
+        "smallest_rho": found.smallest_rho.tolist(), "smallest_r": found.smallest_r.tolist(),
+        "entries": [[*entry, value] for entry, value in zip(found.entries, found.theta.tolist(), strict=True)],
+        "held_out": None if held is None else {
+            "rows": [held.first, held.last], "factor": held.factor, "explained": held.is_explained,
+            "broken": None if held.broken is None else [
+                b._replace(gap=b.gap if math.isfinite(b.gap) else None)._asdict()  # type: ignore[arg-type]
+                for b in held.broken
+            ],
+        },
+    }  # fmt: skip

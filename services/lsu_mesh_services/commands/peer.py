@@ -1,0 +1,83 @@
+"""``lsu-mesh plant|sensor|filter|fusion|recorder NAME``: run one peer in this process."""
+
+from __future__ import annotations
+
+import argparse
+import secrets
+import sys
+import threading
+import time
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.config.table import nearest
+from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh_services.configuration import load_or_explain, session_settings, with_session
+from lsu_mesh_services.exit_codes import USAGE
+
+
+def main(options: argparse.Namespace) -> int:
+    configuration = load_or_explain(options.config, options)
+    if configuration is None:
+        return USAGE
+    known = [name for role, name in configuration.peers() if role == options.role]
+    if options.name not in known:
+        print(
+            f"{configuration.path}: there is no {options.role} {options.name!r}; {nearest(options.name, known)}",
+            file=sys.stderr,
+        )
+        return USAGE
+    return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
+
+
+def _run(configuration: Configuration, options: argparse.Namespace) -> int:
+    settings = session_settings(configuration, options)
+    if options.role == "recorder":
+        from lsu_mesh_services.recorder import run_recorder
+
+        return run_recorder(configuration, options.record, settings, options.stop, options.serve)
+    from lsu_mesh_services.peer import run_node
+
+    return run_node(make_node(configuration, options), settings, options.stop)
+
+
+def _schedule(options: argparse.Namespace, rate: float) -> Schedule:
+    """Now, at the time given, or when standard input says it."""
+    if options.start_at != "-":
+        return Schedule(time.time_ns() if options.start_at is None else options.start_at, rate)
+    schedule = Schedule(None, rate)
+
+    def read_start() -> None:
+        line = sys.stdin.readline().strip()
+        if line.isdigit():
+            schedule.start_ns = int(line)
+
+    threading.Thread(target=read_start, daemon=True).start()
+    return schedule
+
+
+def make_node(configuration: Configuration, options: argparse.Namespace) -> Node:
+    """The node of a role and name."""
+    name, boot = options.name, secrets.token_hex(8)
+    if options.role in ("plant", "sensor"):
+        schedule = _schedule(options, configuration.mesh.rate)
+        if options.role == "plant":
+            from lsu_mesh.mesh.nodes.plant import PlantNode
+
+            return PlantNode(configuration, name, boot, schedule)
+        from lsu_mesh.mesh.nodes.sensor import FileSensorNode, SimulatedSensorNode
+
+        if configuration.sensors[name].file is not None:
+            return FileSensorNode(configuration, name, boot, schedule)
+        return SimulatedSensorNode(configuration, name, boot)
+    if options.role == "filter":
+        from lsu_mesh.mesh.nodes.filter import FilterNode
+
+        return FilterNode(configuration, name, boot)
+    if options.role == "identifier":
+        from lsu_mesh.mesh.nodes.identifier import IdentifierNode
+
+        return IdentifierNode(configuration, name, boot)
+    from lsu_mesh.mesh.nodes.fusion import FusionNode
+
+    return FusionNode(configuration, name, boot)

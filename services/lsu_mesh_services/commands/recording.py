@@ -1,0 +1,86 @@
+"""``lsu-mesh recording info|repair|merge|export``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from lsu_mesh_services.commands.replay import read_or_explain
+from lsu_mesh_services.exit_codes import FAILURE, OK, USAGE
+
+
+def main(options: argparse.Namespace) -> int:
+    actions = {"info": _info, "repair": _repair, "merge": _merge, "export": _export}
+    return actions[options.action](options)
+
+
+def _info(options: argparse.Namespace) -> int:
+    from lsu_mesh_services.recording.summary import print_summary, summary
+
+    recording = read_or_explain(Path(options.file))
+    if recording is None:
+        return USAGE
+    print_summary(summary(recording), as_json=options.json)
+    return OK
+
+
+def _repair(options: argparse.Namespace) -> int:
+    file = Path(options.file)
+    return _mend([file], _output(options, file, "repaired"), options)
+
+
+def _merge(options: argparse.Namespace) -> int:
+    from lsu_mesh_services.recording.read import parts
+
+    files = [Path(name) for name in options.files]
+    if len(files) == 1:
+        files = list(parts(files[0]))
+        if len(files) == 1:
+            print(f"{files[0]}: has no later parts beside it; name the files to join", file=sys.stderr)
+            return USAGE
+    return _mend(files, _output(options, files[0], "merged"), options)
+
+
+def _output(options: argparse.Namespace, file: Path, word: str) -> Path:
+    return file.with_name(f"{file.stem}.{word}{file.suffix}") if options.out is None else Path(options.out)
+
+
+def _mend(files: list[Path], target: Path, options: argparse.Namespace) -> int:
+    from lsu_mesh_services.recording.repair import mend
+
+    if target.exists() and not options.force:
+        print(f"{target}: exists already; choose another file with -o, or say --force", file=sys.stderr)
+        return USAGE
+    before = 0
+    try:
+        before = sum(file.stat().st_size for file in files)
+        mend(files, target)
+    except OSError as error:
+        print(f"{error.filename or target}: {error.strerror or error}", file=sys.stderr)
+        return USAGE if isinstance(error, FileNotFoundError) else FAILURE
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return FAILURE
+    after = target.stat().st_size
+    print(f"{' + '.join(map(str, files))} → {target}: {before / 1e6:.3g} MB → {after / 1e6:.3g} MB")
+    return OK
+
+
+def _export(options: argparse.Namespace) -> int:
+    from lsu_mesh_services.recording.export import export
+
+    file = Path(options.file)
+    recording = read_or_explain(file)
+    if recording is None:
+        return USAGE
+    folder = file.with_suffix("") if options.out is None else Path(options.out)
+    try:
+        written = export(recording, folder, options.format)
+    except OSError as error:
+        text = error.strerror or str(error)
+        print(f"{error.filename or folder}: cannot be written: {text}; choose a folder with -o", file=sys.stderr)
+        return FAILURE
+    for path in written:
+        print(path)
+    return OK

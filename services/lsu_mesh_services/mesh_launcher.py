@@ -1,0 +1,337 @@
+"""A whole mesh as processes of this machine: start, progress, a table, and the line that opens the recording."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.config.measurement_files import read_playback
+from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
+from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.configuration import DEMO, any_port, flags, with_session
+from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
+from lsu_mesh_services.monitoring.run_report import RunReport
+from lsu_mesh_services.monitoring.table import Progress, print_json, print_table
+from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.network.security import certificates, check_endpoints
+from lsu_mesh_services.stop import Stop
+from lsu_mesh_services.supervisor import Supervisor
+from lsu_mesh_services.viewers import Viewer, free_port
+
+READY_S = 60.0
+"""How long the peers may take to start; the first start on a machine compiles the kernels."""
+LINKS_S = 10.0
+"""How long to wait for the last connections when all peers are there."""
+START_LEAD_S = 0.3
+MOST_AT_ONCE = 1024
+"""Messages taken before the children, and whoever says stop, are looked at again, however many more are waiting."""
+QUIET_S = 4.0
+"""The run is over when the sources have ended and nothing new has come for so long."""
+
+
+class Player(Protocol):
+    """Publishes recorded messages in the place of plant and sensors."""
+
+    def announce(self, bus: Bus) -> None:
+        """Declare the keys, so that subscribers know them before the first message."""
+
+    def begin(self, now: int) -> None:
+        """Let the recorded time begin."""
+
+    def play(self, bus: Bus, report: RunReport, now: int, patience: float) -> float:
+        """Publish what is due; returns for how long there is nothing to do, ``patience`` seconds at most."""
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether everything was published."""
+
+
+@dataclass
+class Run:
+    """One run of a mesh under the supervisor."""
+
+    configuration: Configuration
+    options: argparse.Namespace
+    supervisor: Supervisor
+    bus: Bus
+    clock: Clock
+    stop: Stop
+    report: RunReport
+    recording: Path | None
+    player: Player | None = None
+    """Publishes what plant and sensors published in a recording, in their place."""
+    viewer: Viewer | None = None
+    alive: set[str] = field(default_factory=set)
+    happened: list[str] = field(default_factory=list)
+    began: float = field(default_factory=time.monotonic)
+    stopping: bool = False
+
+    def note(self, words: str) -> None:
+        """Remember what happened and when, for the table."""
+        self.happened.append(f"{time.monotonic() - self.began:7.2f} s  {words}")
+
+    def turn(self, timeout: float = 0.05) -> None:
+        """Take what has come, publish what is due, and look after the children."""
+        if self.player is not None:
+            timeout = self.player.play(self.bus, self.report, self.clock.now(), timeout)
+        for taken in range(MOST_AT_ONCE):
+            arrival = self.bus.next(0 if taken else timeout)
+            if arrival is None:
+                break
+            self._take(arrival)
+        if self.viewer is not None and (words := self.viewer.end_words()):
+            self.note(words)
+        for child, words in self.supervisor.watch(time.monotonic()):
+            self.note(words)
+            if child.process is not None and child.process.poll() is not None and child.words:
+                self.note(f"last words of {child.label}:\n{child.last_words()}")
+
+    def _take(self, arrival: Arrival) -> None:
+        if arrival.what == "sample":
+            self.report.deliver(arrival.key, arrival.payload, arrival.arrival_ns)
+            return
+        address = parse(arrival.key)
+        if address is None:
+            return
+        if arrival.what == "alive":
+            self.alive.add(address.name)
+        elif address.name in self.alive:
+            self.alive.discard(address.name)
+            if not self.stopping:
+                self.note(f"{address.name} left the mesh")
+
+
+def run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None = None) -> int:
+    """Run the mesh of a configuration, with a recording in the place of its sources where there is one."""
+    return with_session("run", lambda: _run_mesh(configuration, options, player))
+
+
+def _run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None) -> int:
+    stop: Stop = options.stop
+    clock = Clock()
+    settings = _session_settings(configuration, options)
+    with Bus(settings, clock) as bus:
+        recording = None if options.no_record else _recording_path(configuration, options)
+        supervisor = Supervisor(configuration.supervisor)
+        report = RunReport(configuration)
+        run = Run(configuration, options, supervisor, bus, clock, stop, report, recording, player)
+        return _supervise(run)
+
+
+def _session_settings(configuration: Configuration, options: argparse.Namespace) -> SessionSettings:
+    """The one listener that newcomers find; it reads and publishes nothing."""
+    network = configuration.network
+    listen = (network.entry, *network.listen)
+    check_endpoints(listen, (), insecure=options.insecure)
+    return SessionSettings(
+        connect=network.connect,
+        listen=listen,
+        cache=configuration.cached,
+        certificates=certificates(configuration, READER),
+    )
+
+
+def _recording_path(configuration: Configuration, options: argparse.Namespace) -> Path:
+    template = options.record or configuration.recorder.path
+    moment = time.strftime("%Y%m%d-%H%M%S")
+    return Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
+
+
+def _supervise(run: Run) -> int:
+    for topic in ("truth", "posterior", "fused", "health", "event"):
+        run.bus.subscribe(f"{PREFIX}/{run.configuration.mesh.name}/{topic}/*")
+    run.bus.watch_alive(key(run.configuration.mesh.name, "live", "*"))
+    if run.player is not None:
+        run.player.announce(run.bus)
+    run.viewer = _viewer(run)
+    try:
+        _announce(run)
+        code = _start(run)
+        if code == OK:
+            _follow(run)
+    finally:
+        run.stopping = True
+        complaints = run.supervisor.stop()
+        if run.viewer is not None:
+            run.viewer.close()
+        run.supervisor.kill()
+    run.happened += complaints
+    if code != OK:
+        for words in run.happened:
+            print(words, file=sys.stderr)
+        return OK if run.stop.is_set else code
+    _settle(run)
+    return _sum_up(run)
+
+
+def _viewer(run: Run) -> Viewer | None:
+    """The viewer that is asked for; it follows the recorder."""
+    web_port: int | None = getattr(run.options, "web", None)
+    is_wanted = web_port is not None or getattr(run.options, "view", False)
+    return Viewer(free_port(), web_port is not None, web_port or 0) if is_wanted and run.recording else None
+
+
+def _announce(run: Run) -> None:
+    mesh = run.configuration.mesh
+    last = _last_step(run.configuration)
+    length = "until stopped" if last is None else f"{last} steps"
+    where = "not recorded" if run.recording is None else f"recorded in {run.recording}"
+    played = 0 if run.player is None else sum(role in ("plant", "sensor") for role, _ in run.configuration.peers())
+    count = len(run.configuration.peers()) - (run.recording is None) - played
+    print(f"mesh {mesh.name!r}: {count} peers, {length} at {mesh.rate:g} Hz, {where}", file=sys.stderr)
+
+
+def _start(run: Run) -> int:
+    """Start everyone, wait until all see one another, then let the sources begin."""
+    _compile_kernels()
+    names = set()
+    held = []
+    for role, name in run.configuration.peers():
+        if role == "recorder" and run.recording is None:
+            continue
+        is_source = _is_source(run.configuration, role, name)
+        if run.player is not None and role in ("plant", "sensor"):
+            continue
+        child = run.supervisor.start(role, name, _arguments(run, role), held=is_source)
+        names.add(name)
+        if is_source:
+            held.append(child)
+    if not _await_mesh(run, names):
+        return COULD_NOT_START
+    if run.viewer is not None:
+        print(run.viewer.open(), file=sys.stderr)
+    begin = run.clock.now() + int(START_LEAD_S * 1e9)
+    if run.player is not None:
+        run.player.begin(begin)
+    for child in held:
+        run.supervisor.tell(child, str(begin))
+    return OK
+
+
+def _compile_kernels() -> None:
+    """Compile once here, so that the children only load."""
+    from lsu_mesh.filters.warm_up import warm_up
+
+    warm_up()
+
+
+def _is_source(configuration: Configuration, role: str, name: str) -> bool:
+    return role == "plant" or (role == "sensor" and configuration.sensors[name].file is not None)
+
+
+def _arguments(run: Run, role: str) -> list[str]:
+    """What a child is started with: the configuration of this run."""
+    file = run.options.file if run.options.file is not None else str(DEMO)
+    arguments = ["-c", file, "-e", run.configuration.network.entry, "-l", any_port(run.configuration)]
+    last = _last_step(run.configuration)
+    end = [] if last is None else [f"mesh.steps={last}"]
+    for override in [*flags(run.options), *run.options.overrides, *end]:
+        arguments += ["-X", override]
+    if role in ("plant", "sensor"):
+        arguments += ["--start-at", "-"]
+    if role == "recorder":
+        arguments += ["--record", str(run.recording)]
+        if run.viewer is not None:
+            arguments += ["--serve", str(run.viewer.port)]
+    return arguments
+
+
+def _await_mesh(run: Run, names: set[str]) -> bool:
+    """Wait until every peer is there and connected to all others; False when one could not start."""
+    end, patience = time.monotonic() + READY_S, 0.0
+    while True:
+        run.turn()
+        if run.stop:
+            run.note("stopped before the mesh was up")
+            return False
+        failed = [child for child in run.supervisor.children if child.given_up or child.restarts]
+        if failed or time.monotonic() > end:
+            run.note(f"the mesh did not come up; not there: {', '.join(sorted(names - run.alive))}")
+            return False
+        if names <= run.alive:
+            if all(run.report.links.get(name, 0) >= len(names) for name in names):
+                return True
+            patience = patience or time.monotonic() + LINKS_S
+            if time.monotonic() > patience:
+                run.note(f"not all peers are connected after {LINKS_S:g} s; going on: {run.report.links}")
+                return True
+
+
+def _follow(run: Run) -> None:
+    """Until the last step has been reached everywhere, the sources have ended, or someone says stop."""
+    last = _last_step(run.configuration)
+    newest, changed = 0, time.monotonic()
+    with Progress(last, shown=not run.options.json) as progress:
+        while not run.stop:
+            run.turn()
+            reached = run.report.progress()
+            progress.show(reached)
+            if reached > newest:
+                newest, changed = reached, time.monotonic()
+            if last is not None and run.report.last_step() >= last:
+                return
+            if time.monotonic() - changed > QUIET_S and _sources_ended(run, last):
+                run.note(f"nothing new for {QUIET_S:g} s after the sources ended at step {last}")
+                return
+
+
+def _sources_ended(run: Run, last: int | None) -> bool:
+    if run.player is not None:
+        return run.player.is_finished
+    steps = run.report.source_steps
+    return last is not None and bool(steps) and max(steps.values()) >= last
+
+
+def _last_step(configuration: Configuration) -> int | None:
+    ends = [] if configuration.mesh.steps is None else [configuration.mesh.steps]
+    mesh = configuration.mesh
+    files = [sensor.file for sensor in configuration.sensors.values() if sensor.file is not None]
+    if files:
+        ends.append(max(int(read_playback(file, mesh.dt, mesh.start_time).steps[-1]) for file in files))
+    return min(ends) if ends else None
+
+
+def _settle(run: Run) -> None:
+    """Take what was still under way."""
+    end = time.monotonic() + 0.3
+    while time.monotonic() < end:
+        arrival = run.bus.next(0.05)
+        if arrival is not None and arrival.what == "sample":
+            run.report.deliver(arrival.key, arrival.payload, arrival.arrival_ns)
+
+
+def _sum_up(run: Run) -> int:
+    restarts = {child.name: child.restarts for child in run.supervisor.children}
+    rows = run.report.rows(restarts)
+    opening = _opening_line(run.recording)
+    if run.options.json:
+        print_json(rows, run.happened, run.report.events, run.recording)
+    else:
+        print_table(rows, run.happened, run.report.events, opening)
+    gave_up = [child.label for child in run.supervisor.children if child.given_up]
+    nothing = not any(row.steps for row in rows)
+    if nothing:
+        print("no estimate was published", file=sys.stderr)
+    return FAILURE if gave_up or nothing else OK
+
+
+def _opening_line(recording: Path | None) -> str:
+    if recording is None:
+        return ""
+    module = [sys.executable, "-m", "lsu_mesh_services"]
+    program: Sequence[str] = [sys.argv[0]] if sys.argv[0].endswith("lsu-mesh") else module
+    return " ".join([_relative(program[0]), *program[1:], "view", str(recording)])
+
+
+def _relative(program: str) -> str:
+    path = Path(program)
+    try:
+        return str(path.absolute().relative_to(Path.cwd()))
+    except ValueError:
+        return program

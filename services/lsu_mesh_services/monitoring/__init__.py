@@ -1,0 +1,1 @@
+"""Listening to a mesh and summing up what was heard."""

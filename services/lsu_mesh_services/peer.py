@@ -1,0 +1,191 @@
+"""One peer: a node of the mesh with its session, its queue and its clock."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections.abc import Iterable
+
+from lsu_mesh.mesh.keys import key, last_key, model_key, parse
+from lsu_mesh.mesh.messages import Message, encode, encoding
+from lsu_mesh.mesh.nodes.estimator import Estimator
+from lsu_mesh.mesh.nodes.filter import FilterNode
+from lsu_mesh.mesh.nodes.fusion import FusionNode
+from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.network.gap_recovery import Recovery
+from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.stop import Stop
+
+LOOK_AT_LINKS_NS = 100_000_000
+LONGEST_WAIT = 0.1
+"""Seconds between looks at the stop flag and the parent."""
+
+
+def run_node(node: Node, settings: SessionSettings, stop: Stop) -> int:
+    """Run a node until it is told to stop; returns the exit code."""
+    clock = Clock()
+    node.rehearse()
+    gc.collect()
+    gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
+    with Bus(settings, clock) as bus:
+        peer = Peer(node, bus, clock)
+        peer.declare()
+        print(f"{node.role} {node.name}: on the mesh", file=sys.stderr)
+        said_finished = False
+        while not stop:
+            peer.turn()
+            if node.finished and not said_finished:
+                said_finished = True
+                print(
+                    f"{node.role} {node.name}: all steps are published; serving late joiners until stopped",
+                    file=sys.stderr,
+                )
+        peer.farewell()
+    return 0
+
+
+class Peer:
+    """The loop around a node: drain the queue, tick, publish."""
+
+    def __init__(self, node: Node, bus: Bus, clock: Clock) -> None:
+        self._node = node
+        self._bus = bus
+        self._clock = clock
+        self._mesh = node.configuration.mesh.name
+        self._links = -1
+        self._next_look = 0
+        self._measured_until = self._worst_queue = self._worst_ns = self._worst_age_ns = 0
+        self._recovery = Recovery(node.gate, bus.ask_cache)
+
+    def declare(self) -> None:
+        """Publishers, subscriptions, the liveliness token, queries and answers."""
+        for topic in (*self._node.publishes, "health", "event"):
+            self._bus.announce(key(self._mesh, topic, self._node.name))
+        for topic, name in self._node.subscriptions():
+            self._bus.subscribe(key(self._mesh, topic, name))
+        self._bus.watch_alive(key(self._mesh, "live", "*"))
+        self._bus.declare_alive(key(self._mesh, "live", self._node.name))
+        if isinstance(self._node, FilterNode):
+            self._bus.ask(last_key(self._mesh, self._node.name))
+        if isinstance(self._node, FusionNode):
+            for name in self._node.sources:
+                self._answer_last(self._node, name)
+        if isinstance(self._node, Estimator):
+            self._answer_latest(self._node)
+
+    def _answer_last(self, node: FusionNode, name: str) -> None:
+        def answers() -> tuple[str, bytes, str] | None:
+            last = node.last.get(name)
+            if last is None:
+                return None
+            return last_key(self._mesh, name), encode(last), encoding(last.topic)
+
+        self._bus.answer(last_key(self._mesh, name), answers)
+
+    def _answer_latest(self, node: Estimator) -> None:
+        topic = "fused" if isinstance(node, FusionNode) else "posterior"
+        own_key = key(self._mesh, topic, node.name)
+
+        def latest() -> tuple[str, bytes, str] | None:
+            last = node.last_posterior
+            return None if last is None else (own_key, encode(last), encoding(last.topic))
+
+        self._bus.answer(own_key, latest)
+        if topic == "fused" or not node.configuration.fusion:
+            payload = encode_model(node)
+            self._bus.answer(model_key(self._mesh), lambda: (model_key(self._mesh), payload, "application/msgpack"))
+
+    def turn(self) -> None:
+        """Wait for something to do, then do all of it."""
+        self._watch_links()
+        self._recovery.look(self._clock.now(), self._bus.waiting())
+        arrival = self._bus.next(self._patience())
+        began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
+        age_ns = 0 if arrival is None else began - arrival.arrival_ns
+        for taken in range(1, self._node.takes_at_once + 1):
+            if arrival is None:
+                break
+            self._publish(self._take(arrival))
+            arrival = self._bus.next(0) if taken < self._node.takes_at_once else None
+        self._publish(self._node.tick(self._clock.now()))
+        self._measure(queued, age_ns, self._clock.now() - began)
+
+    def _measure(self, queued: int, age_ns: int, took_ns: int) -> None:
+        """What the next health message tells of the process: the worst since the last one."""
+        if self._node.next_health != self._measured_until:
+            self._measured_until = self._node.next_health
+            self._worst_queue = self._worst_ns = self._worst_age_ns = 0
+        self._worst_queue, self._worst_ns = max(self._worst_queue, queued), max(self._worst_ns, took_ns)
+        self._worst_age_ns = max(self._worst_age_ns, age_ns)
+        self._node.gauges |= {
+            "queue": float(self._worst_queue),
+            "queue_ms": self._worst_age_ns * 1e-6,
+            "dropped": float(self._bus.dropped),
+            "step_ms": self._worst_ns * 1e-6,
+        }
+
+    def _watch_links(self) -> None:
+        now = self._clock.now()
+        if now < self._next_look:
+            return
+        self._next_look = now + LOOK_AT_LINKS_NS
+        links = self._bus.links()
+        if links != self._links:
+            self._links = links
+            self._node.note_links(links)
+
+    def farewell(self) -> None:
+        """A last health message, so that the counts of the whole run are known."""
+        self._publish([self._node.health(self._clock.now())])
+
+    def _patience(self) -> float:
+        wakeup = self._node.wakeup()
+        if wakeup is None:
+            return LONGEST_WAIT
+        return min(LONGEST_WAIT, max(0.0005, (wakeup - self._clock.now()) * 1e-9))
+
+    def _take(self, arrival: Arrival) -> list[Message]:
+        if arrival.what == "sample":
+            return self._node.deliver(self._canonical(arrival.key), arrival.payload, arrival.arrival_ns)
+        address = parse(arrival.key)
+        if address is not None and isinstance(self._node, Estimator) and address.name in self._node.sources:
+            if arrival.what == "gone":
+                self._node.absent.add(address.name)
+            else:
+                self._node.absent.discard(address.name)
+        return []
+
+    def _canonical(self, sample_key: str) -> str:
+        """Answers to ``last/NAME`` are posteriors of NAME."""
+        if sample_key == last_key(self._mesh, self._node.name):
+            return key(self._mesh, "posterior", self._node.name)
+        return sample_key
+
+    def _publish(self, messages: Iterable[Message]) -> None:
+        for message in messages:
+            self._bus.publish(self._node.key(message), encode(message), encoding(message.topic))
+
+
+def encode_model(node: Node) -> bytes:
+    """The model as a MessagePack map: A, B, C by sensor, rho, r by sensor, noise_map, names, dt, digest."""
+    import msgspec
+
+    configuration = node.configuration
+    model = configuration.base_model
+    content = {
+        "v": 1,
+        "model": configuration.digest(),
+        "dt": configuration.mesh.dt,
+        "A": model.A.tolist(),
+        "B": None if model.B is None else model.B.tolist(),
+        "noise_map": None if model.noise_map is None else model.noise_map.tolist(),
+        "rho": model.rho.tolist(),
+        "states": list(model.states),
+        "units": list(model.units),
+        "sensors": {
+            name: {"C": [list(row) for row in sensor.C], "r": list(sensor.r), "outputs": list(sensor.outputs)}
+            for name, sensor in configuration.sensors.items()
+        },
+    }
+    return msgspec.msgpack.encode(content)

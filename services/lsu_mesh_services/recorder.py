@@ -1,0 +1,170 @@
+"""The recorder process: subscribes to everything, owns the only recording."""
+
+from __future__ import annotations
+
+import gc
+import os
+import secrets
+import sys
+import time
+from pathlib import Path
+
+from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
+from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
+from lsu_mesh.mesh.nodes.source_timeout import Silences
+from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
+from lsu_mesh_services.network.gap_recovery import Recovery
+from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.recording.recorder import Recorder
+from lsu_mesh_services.recording.stream import next_part
+from lsu_mesh_services.stop import Stop
+
+ROLE_NAME = "recorder"
+AFTER_STOP_S = 0.5
+"""How long the recorder goes on taking what is under way after it was told to stop, at the most."""
+QUIET_S = 0.2
+"""Then nothing is under way any more."""
+MOST_AT_ONCE = 2048
+"""Messages recorded before the recorder looks up again: at what it is told, and at the time."""
+
+
+def run_recorder(
+    configuration: Configuration,
+    record: str | None,
+    settings: SessionSettings,
+    stop: Stop,
+    serve_port: int | None = None,
+) -> int:
+    """Record until told to stop, and let viewers follow on ``serve_port`` of the loopback; returns the exit code."""
+    clock = Clock()
+    template = record or configuration.recorder.path
+    moment = time.strftime("%Y%m%d-%H%M%S")
+    path = Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
+    was_restarted = os.environ.get("LSU_MESH_RESTARTS", "0") != "0"
+    part = next_part(path) if was_restarted else path
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        recorder = Recorder(configuration, part, serve_port=serve_port, continues=path if part != path else None)
+    except OSError as error:
+        print(
+            f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record",
+            file=sys.stderr,
+        )
+        return COULD_NOT_START
+    try:
+        with Bus(settings, clock) as bus:
+            service = RecorderService(configuration, recorder, bus, clock)
+            service.declare()
+            gc.collect()
+            gc.freeze()  # as every peer does
+            print(f"recorder: on the mesh, writing {part}", file=sys.stderr)
+            while not stop:
+                service.turn()
+            service.finish()
+    finally:
+        recorder.close()
+        for problem in recorder.problems:
+            print(f"recorder: {problem}", file=sys.stderr, flush=True)
+        if not recorder.has_ended:
+            os._exit(FAILURE)  # Rerun's own clean-up at the end of a process would hang as well
+    return OK
+
+
+class RecorderService:
+    """The loop around the recording: drain the queue, record, flush, tell its health."""
+
+    def __init__(self, configuration: Configuration, recorder: Recorder, bus: Bus, clock: Clock) -> None:
+        self._configuration = configuration
+        self._recorder = recorder
+        self._bus = bus
+        self._clock = clock
+        self._mesh = configuration.mesh.name
+        self._gate = Gate(configuration, TYPES)
+        self._recovery = Recovery(self._gate, bus.ask_cache)
+        self._boot = secrets.token_hex(8)
+        self._sequence = 0
+        self._next_health = 0
+        self._links = -1
+        self._queue = self._longest_ns = 0
+        """The longest queue and turn since the last health message."""
+        self._roles = {name: role for role, name in configuration.peers()}
+        others = [name for name in self._roles if name != ROLE_NAME]
+        self._silences = Silences(configuration, [("health", name) for name in others], others)
+        """Everybody tells its health every second; of whom nothing is heard, nothing is recorded."""
+
+    def declare(self) -> None:
+        """Subscribe to all topics, watch the peers, show that the recorder is there."""
+        self._bus.announce(key(self._mesh, "health", ROLE_NAME))
+        for topic in TOPICS:
+            if topic != "live":
+                self._bus.subscribe(f"{PREFIX}/{self._mesh}/{topic}/*")
+        self._bus.watch_alive(key(self._mesh, "live", "*"))
+        self._bus.declare_alive(key(self._mesh, "live", ROLE_NAME))
+
+    def turn(self) -> None:
+        """Take what has come, then flush if it is time."""
+        began, self._queue = self._clock.now(), max(self._queue, self._bus.waiting())
+        taken = self._take_all(MOST_AT_ONCE)
+        now = self._clock.now()
+        self._recovery.look(now, self._bus.waiting())
+        self._recorder.tick(now)
+        links = self._bus.links()
+        if now >= self._next_health or links != self._links:
+            self._links = links
+            self._next_health = now + 1_000_000_000
+            self._tell_health(now)
+        if taken:
+            self._longest_ns = max(self._longest_ns, self._clock.now() - began)
+
+    def finish(self) -> None:
+        """Take what is under way, hear no more, and record all that has come; the file is closed by who opened it."""
+        end = time.monotonic() + AFTER_STOP_S
+        quiet_since = time.monotonic()
+        while (now := time.monotonic()) < end and now - quiet_since < QUIET_S:
+            if self._take_all(MOST_AT_ONCE):
+                quiet_since = now
+        self._bus.close()
+        while self._take_all(MOST_AT_ONCE, 0.0):
+            pass
+
+    def _take_all(self, most: int, patience: float = 0.05) -> int:
+        """Record what has come, waiting for the first of it so many seconds; returns how much it was."""
+        taken = 0
+        while taken < most and (arrival := self._bus.next(0.0 if taken else patience)) is not None:
+            self._take(arrival)
+            taken += 1
+        return taken
+
+    def _take(self, arrival: Arrival) -> None:
+        if arrival.what == "sample":
+            duplicates = self._gate.duplicates
+            message = self._gate.admit(arrival.key, arrival.payload)
+            if message is not None or self._gate.duplicates == duplicates:
+                self._recorder.record(arrival.key, arrival.payload, arrival.arrival_ns, message)
+            if isinstance(message, Health) and message.name != ROLE_NAME:
+                self._silences.heard(message.name, arrival.arrival_ns)
+            return
+        address = parse(arrival.key)
+        if address is not None:
+            role = self._roles.get(address.name, "peer")
+            self._recorder.peer_changed(role, address.name, arrival.what == "alive", arrival.arrival_ns)
+
+    def _tell_health(self, now: int) -> None:
+        problems = list(self._recorder.problems)
+        problems += [complaint.text for complaint in self._silences.complaints(now)]
+        if self._bus.dropped:
+            problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
+        counters = self._gate.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}
+        counters |= {"links": float(self._links), "step_ms": self._longest_ns * 1e-6}
+        self._queue = self._longest_ns = 0
+        counters |= {f"flushed {flushed}": float(seq) for flushed, seq in self._recorder.flushed.items()}
+        health = Health(
+            v=VERSION, src=f"{ROLE_NAME}/{ROLE_NAME}", boot=self._boot, seq=self._sequence, step=0, sent_ns=now,
+            origin_ns=now, model=self._configuration.digest(), role=ROLE_NAME,
+            level="WARN" if problems else "OK", reasons=problems[:16], counters=counters,
+        )  # fmt: skip
+        self._sequence += 1
+        self._bus.publish(key(self._mesh, "health", ROLE_NAME), encode(health), encoding("health"))

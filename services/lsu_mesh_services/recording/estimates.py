@@ -1,0 +1,158 @@
+"""Truth, bands, errors, widths, volumes and latencies: the numbers of every posterior and fused set, none thinned."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from lsu_mesh.mesh.messages import Posterior, Truth
+from lsu_mesh_services.recording.bands import band_columns, band_style, error_columns, error_style, line_style
+from lsu_mesh_services.recording.entity_paths import Names, path
+from lsu_mesh_services.recording.palette import TRUTH, Color
+from lsu_mesh_services.recording.timeline import Moment, Timelines
+
+REMEMBERED = 4096
+"""Steps for which a truth waits for sets and sets wait for the truth."""
+
+Array = NDArray[np.float64]
+Kept = TypeVar("Kept")
+
+
+class _Row(NamedTuple):
+    moment: Moment
+    lower: list[float]
+    point: list[float]
+    upper: list[float]
+    log_volume: float | None
+    gain: float | None
+    latency_ms: float
+
+
+class _Error(NamedTuple):
+    moment: Moment
+    row: _Row
+    truth: list[float]
+
+
+class Estimates:
+    """Collects estimates and truths, joins them by step, and sends them in batches."""
+
+    def __init__(
+        self, stream: rr.RecordingStream, timelines: Timelines, names: Names, colors: dict[str, Color]
+    ) -> None:
+        self._stream = stream
+        self._timelines = timelines
+        self._names = names
+        self._truths: dict[int, list[float]] = {}
+        self._untold: dict[int, list[tuple[str, _Row]]] = {}
+        self._truth_rows: list[tuple[Moment, list[float]]] = []
+        self._rows: defaultdict[str, list[_Row]] = defaultdict(list)
+        self._errors: defaultdict[str, list[_Error]] = defaultdict(list)
+        self._style(colors)
+
+    def add_truth(self, message: Truth, arrival_ns: int) -> None:
+        """The true state of a step; sets of this step that came before it get their errors now."""
+        moment = Moment(message.step, arrival_ns)
+        self._truth_rows.append((moment, message.x))
+        _remember(self._truths, message.step, message.x)
+        for peer, row in self._untold.pop(message.step, ()):
+            self._errors[peer].append(_Error(row.moment, row, message.x))
+
+    def add(self, message: Posterior, arrival_ns: int) -> None:
+        """A posterior or a fused set."""
+        moment = Moment(message.step, arrival_ns)
+        latency = (arrival_ns - message.origin_ns) / 1e6
+        row = _Row(moment, message.lower, message.point, message.upper, message.log_volume, message.gain, latency)
+        self._rows[message.name].append(row)
+        truth = self._truths.get(message.step)
+        if truth is not None:
+            self._errors[message.name].append(_Error(moment, row, truth))
+            return
+        waiting = self._untold.get(message.step)
+        if waiting is None:
+            _remember(self._untold, message.step, [(message.name, row)])
+        else:
+            waiting.append((message.name, row))
+
+    def flush(self) -> None:
+        """Send all rows that wait."""
+        rows, self._rows = self._rows, defaultdict(list)
+        errors, self._errors = self._errors, defaultdict(list)
+        truths, self._truth_rows = self._truth_rows, []
+        if truths:
+            self._send_truth(truths)
+        for peer, of_peer in rows.items():
+            self._send_rows(peer, of_peer)
+        for peer, errors_of_peer in errors.items():
+            self._send_errors(peer, errors_of_peer)
+
+    def _send_truth(self, rows: list[tuple[Moment, list[float]]]) -> None:
+        times = self._timelines.columns([moment for moment, _ in rows])
+        states = np.array([x for _, x in rows])
+        for i, state in enumerate(self._names.states):
+            self._stream.send_columns(path("truth", state), times, rr.Measurements.columns(values=states[:, i]))
+
+    def _send_rows(self, peer: str, rows: list[_Row]) -> None:
+        times = self._timelines.columns([row.moment for row in rows])
+        series = _series(rows)
+        for i, state in enumerate(self._names.states):
+            columns = band_columns(series[:, 0, i], series[:, 1, i], series[:, 2, i])
+            self._stream.send_columns(path("bands", state, peer), times, columns)
+        widths = series[:, 2] - series[:, 0]
+        self._stream.send_columns(path("widths", peer), times, rr.Scalars.columns(scalars=widths))
+        latencies = np.array([row.latency_ms for row in rows])
+        self._stream.send_columns(path("latency", peer), times, rr.Scalars.columns(scalars=latencies))
+        self._send_known("log_volume", peer, [(row.moment, row.log_volume) for row in rows])
+        self._send_known("gain", peer, [(row.moment, row.gain) for row in rows])
+
+    def _send_known(self, what: str, peer: str, rows: list[tuple[Moment, float | None]]) -> None:
+        known = [(moment, value) for moment, value in rows if value is not None]
+        if known:
+            values = np.array([value for _, value in known])
+            times = self._timelines.columns([moment for moment, _ in known])
+            self._stream.send_columns(path(what, peer), times, rr.Scalars.columns(scalars=values))
+
+    def _send_errors(self, peer: str, errors: list[_Error]) -> None:
+        times = self._timelines.columns([error.moment for error in errors])
+        series = _series([error.row for error in errors]) - np.array([error.truth for error in errors])[:, None, :]
+        for i, state in enumerate(self._names.states):
+            columns = error_columns(series[:, 0, i], series[:, 1, i], series[:, 2, i])
+            self._stream.send_columns(path("errors", state, peer), times, columns)
+
+    def _style(self, colors: dict[str, Color]) -> None:
+        for state in self._names.states:
+            self._stream.log(path("truth", state), line_style("truth", TRUTH, 2.0), static=True)
+            for peer, color in colors.items():
+                self._stream.log(path("bands", state, peer), band_style(peer, color), static=True)
+                self._stream.log(path("errors", state, peer), error_style(peer, color), static=True)
+        labels = [self._names.label(i) for i in range(len(self._names.states))]
+        for peer, color in colors.items():
+            shades = [_shade(color, i, len(labels)) for i in range(len(labels))]
+            self._line(path("widths", peer), shades, [f"{peer} {label}" for label in labels])
+            for what in ("log_volume", "gain", "latency"):
+                self._line(path(what, peer), [color], [peer])
+
+    def _line(self, entity: str, colors: list[Color], names: list[str]) -> None:
+        self._stream.log(entity, rr.SeriesLines(colors=colors, widths=[1.5] * len(names), names=names), static=True)
+
+
+def _series(rows: list[_Row]) -> Array:
+    """(rows, 3, n): lower, point, upper."""
+    return np.array([(row.lower, row.point, row.upper) for row in rows])
+
+
+def _remember(memory: dict[int, Kept], step: int, value: Kept) -> None:
+    memory[step] = value
+    while len(memory) > REMEMBERED:
+        del memory[next(iter(memory))]
+
+
+def _shade(color: Color, i: int, count: int) -> Color:
+    """Shades of one colour for several series of one peer: from the colour itself towards its dark."""
+    share = 1.0 - 0.55 * (i / max(count - 1, 1))
+    red, green, blue = (int(part * share) for part in color)
+    return red, green, blue

@@ -1,0 +1,80 @@
+"""Raw payloads, lossless: every message as it came, the source of truth of a recording.
+
+One entity per topic and name, ``/raw/<topic>/<name>``, and ``/raw/refused`` for payloads that are no message of this
+mesh. A row holds ``payload`` (bytes), ``key``, ``arrival_ns`` and ``number``, which orders all rows by arrival: it
+counts from the nanosecond at which the recorder started, so that a later part of a recording counts on.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+import pyarrow as pa
+import rerun as rr
+
+from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.messages import Message
+from lsu_mesh_services.recording.entity_paths import path
+from lsu_mesh_services.recording.timeline import Moment, Timelines, wall_column
+
+ARCHETYPE = "lsu.Raw"
+REFUSED = "/raw/refused"
+
+
+@dataclass
+class _Rows:
+    moments: list[Moment] = field(default_factory=list)
+    payloads: list[bytes] = field(default_factory=list)
+    keys: list[str] = field(default_factory=list)
+    numbers: list[int] = field(default_factory=list)
+
+
+class RawStore:
+    """Collects raw payloads and sends them in batches."""
+
+    def __init__(self, stream: rr.RecordingStream, timelines: Timelines) -> None:
+        self._stream = stream
+        self._timelines = timelines
+        self._entities: dict[str, str] = {}
+        self._rows: defaultdict[str, _Rows] = defaultdict(_Rows)
+        self._number = time.time_ns()
+
+    def add(self, key: str, payload: bytes, arrival_ns: int, message: Message | None) -> None:
+        """Keep a payload for the next flush."""
+        rows = self._rows[REFUSED if message is None else self._entity(key)]
+        rows.moments.append(Moment(0 if message is None else message.step, arrival_ns))
+        rows.payloads.append(payload)
+        rows.keys.append(key)
+        rows.numbers.append(self._number)
+        self._number += 1
+
+    def flush(self) -> None:
+        """Send all rows that wait."""
+        waiting, self._rows = self._rows, defaultdict(_Rows)
+        for entity, rows in waiting.items():
+            self._send(entity, rows)
+
+    def _send(self, entity: str, rows: _Rows) -> None:
+        arrivals = [moment.wall_ns for moment in rows.moments]
+        columns = rr.DynamicArchetype.columns(
+            ARCHETYPE,
+            components={
+                "payload": pa.array(rows.payloads, pa.binary()),
+                "key": pa.array(rows.keys, pa.string()),
+                "arrival_ns": np.array(arrivals, dtype=np.int64),
+                "number": np.array(rows.numbers, dtype=np.uint64),
+            },
+        )
+        times = [wall_column(arrivals)] if entity == REFUSED else self._timelines.columns(rows.moments)
+        self._stream.send_columns(entity, times, columns)
+
+    def _entity(self, key: str) -> str:
+        entity = self._entities.get(key)
+        if entity is None:
+            address = parse(key)
+            entity = REFUSED if address is None else path("raw", address.topic, address.name)
+            self._entities[key] = entity
+        return entity

@@ -1,0 +1,158 @@
+"""Opening the recording stream: file, batching, properties of the run."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import importlib.metadata
+import json
+import os
+import platform
+import sys
+import tempfile
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh_services.recording.blueprint import blueprint
+from lsu_mesh_services.recording.entity_paths import Names
+from lsu_mesh_services.recording.repair import mend
+
+LONGEST_INDEXED_S = 300.0
+"""Runs that are longer have no index of their chunks at the end of the file: until then it would grow in memory."""
+PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "rerun-sdk")
+
+
+def open_stream(
+    names: Names,
+    path: Path,
+    run_properties: Mapping[str, str],
+    serve_port: int | None = None,
+    continues: Path | None = None,
+) -> rr.RecordingStream:
+    """A stream into a new file, and to viewers on ``serve_port`` of the loopback where it is given.
+
+    ``continues`` is an earlier part of the same recording. Raises ``OSError`` where the file exists or cannot be made;
+    a folder that is missing is made.
+    """
+    _claim(path)
+    rr.set_strict_mode(True)  # an error is an exception, which the recorder counts; else data vanish with a warning
+    configuration = names.configuration
+    stream = rr.RecordingStream(
+        application_id(configuration),
+        recording_id=(continues and recording_id(continues)) or f"{configuration.mesh.name}-{os.urandom(8).hex()}",
+        batcher_config=rr.ChunkBatcherConfig(flush_tick=configuration.recorder.flush),
+    )
+    sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(path, write_footer=_is_short(configuration))]
+    if serve_port is not None:
+        sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=serve_port, server_memory_limit="256MB"))
+    stream.set_sinks(*sinks, default_blueprint=blueprint(names))
+    stream.send_recording_name(f"{configuration.mesh.name} {path.stem}")
+    properties: dict[str, Any] = run_description(configuration) | dict(run_properties)
+    stream.send_property("lsu_mesh", rr.AnyValues(**properties))
+    return stream
+
+
+def _is_short(configuration: Configuration) -> bool:
+    steps, rate = configuration.mesh.steps, configuration.mesh.rate or 1.0 / configuration.mesh.dt
+    return steps is not None and steps <= LONGEST_INDEXED_S * rate
+
+
+def recording_id(path: Path) -> str | None:
+    """Identifier of the recording in a file, also in one cut short; ``None`` where there is none."""
+    try:
+        try:
+            return _recording_id(path)
+        except RuntimeError:
+            with tempfile.TemporaryDirectory(prefix="part-") as folder:
+                mend([path], Path(folder) / "mended.rrd")
+                return _recording_id(Path(folder) / "mended.rrd")
+    except (OSError, ValueError):
+        return None
+
+
+def _recording_id(path: Path) -> str | None:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="RRD file has no footer")
+        recordings = RrdReader(path).recordings()
+    return str(recordings[0].recording_id) if recordings else None
+
+
+def application_id(configuration: Configuration) -> str:
+    """Name under which the viewer remembers a layout; no other mesh or version may open in the layout of this one."""
+    peers = [configuration.peers(), configuration.base_model.states, _version("lsu-mesh")]
+    kinds = [(one.kind, one.sensors, one.transfer) for one in configuration.filters.values()]
+    digest = hashlib.blake2b(json.dumps([peers, kinds]).encode(), digest_size=4).hexdigest()
+    return f"lsu-mesh {configuration.mesh.name} {digest}"
+
+
+def next_part(path: Path) -> Path:
+    """``path`` where it is free, else the first free one of ``NAME.part2.rrd``, ``NAME.part3.rrd``, …"""
+    part, number = path, 1
+    while part.exists():
+        number += 1
+        part = path.with_name(f"{path.stem}.part{number}{path.suffix}")
+    return part
+
+
+def run_description(configuration: Configuration) -> dict[str, str]:
+    """What a reader needs to compute a recording again: configuration, model, seed, versions, processor."""
+    model = configuration.base_model
+    matrices = {
+        "A": model.A.tolist(),
+        "B": None if model.B is None else model.B.tolist(),
+        "noise_map": None if model.noise_map is None else model.noise_map.tolist(),
+        "rho": model.rho.tolist(),
+        "sensors": {name: {"C": sensor.C, "r": sensor.r} for name, sensor in configuration.sensors.items()},
+    }
+    return {
+        "configuration": _text(configuration.path),
+        "configuration_path": str(configuration.path),
+        "settings": json.dumps(configuration.values),
+        "mesh": configuration.mesh.name,
+        "model": json.dumps(matrices),
+        "model_digest": configuration.digest(),
+        "seed": str(configuration.mesh.seed),
+        "dt": repr(configuration.mesh.dt),
+        "python": platform.python_version(),
+        "cpu": processor(),
+        "platform": f"{sys.platform} {platform.machine()}",
+        "numba_cpu_name": os.environ.get("NUMBA_CPU_NAME", ""),
+    } | {package.replace("-", "_"): _version(package) for package in PACKAGES}
+
+
+def _claim(path: Path) -> None:
+    """Make sure that the file is new and can be written; Rerun itself would overwrite it or fail in silence."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with path.open("xb"):
+            pass
+    except FileExistsError:
+        text = "the file exists already and would be overwritten"
+        raise FileExistsError(errno.EEXIST, text, str(path)) from None
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        return f"not readable when the recording began: {error}"
+
+
+def processor() -> str:
+    """Name of the processor for which the kernels are compiled."""
+    from llvmlite import binding  # numba's own name of the target, which decides what its kernels are compiled to
+
+    return str(binding.get_host_cpu_name())

@@ -1,0 +1,63 @@
+"""After its rehearsal a peer loads no kernel for transfers, for starts from sets, or for its reach."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lsu_mesh import LSUO, LSUModel, Orthotope
+from lsu_mesh.mesh.estimation.warm_up import rehearse
+
+SCRIPT = """
+import gc
+import sys
+from pathlib import Path
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from lsu_mesh.mesh.config import load
+from lsu_mesh.mesh.nodes.filter import FilterNode
+from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.parallelotope import Parallelotope
+
+def loaded():
+    kernels = [kernel for kernel in gc.get_objects() if isinstance(kernel, Dispatcher)]
+    return {(kernel.py_func.__name__, str(signature)) for kernel in kernels for signature in kernel.signatures}
+
+node = FilterNode(load(Path(sys.argv[1])), sys.argv[2], "0" * 16)
+before = node.engine.bounds()
+node.rehearse()
+assert np.array_equal(before, node.engine.bounds()), "left as it was"
+known = loaded()
+box = Orthotope([-4.0] * 3, [4.0] * 3)
+slab = Orthotope([-0.1, -3.0, -3.0], [0.1, 3.0, 3.0])
+for other in (Parallelotope([0.0] * 3, 5.0 * np.eye(3)), box, node.engine.support, slab):
+    node.engine.condition(other)
+    node.engine.predict(np.zeros(1))
+    node.engine.reset(other)
+    node.engine.predict(np.zeros(1))
+node.reach.begin(box)
+node.reach.predict(np.zeros(1))
+print(sorted(loaded() - known))
+"""
+
+
+@pytest.mark.parametrize("name", ["box", "para", "cz"])
+def test_nothing_is_loaded_after_the_rehearsal(name: str, demo: Path) -> None:
+    command = [sys.executable, "-c", SCRIPT, str(demo), name]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "[]"
+
+
+def test_a_state_that_leaves_its_domain_in_the_rehearsal_ends_only_that() -> None:
+    model = LSUModel(A=[[2.0]], B=None, C=[[1.0]], rho=[0.1], r=[0.5], domain=Orthotope([0.0], [9.0]))
+    engine = LSUO(model, Orthotope([4.0], [5.0]))
+    before = np.array(engine.bounds())
+    rehearse(engine, None)
+    assert np.array_equal(before, engine.bounds())

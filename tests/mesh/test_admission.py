@@ -1,0 +1,94 @@
+"""The gate: new, known and sound messages pass once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lsu_mesh.mesh.admission import Gate, Sequence
+from lsu_mesh.mesh.config import Configuration, load
+from lsu_mesh.mesh.messages import Measurement, encode
+
+KEY = "lsu/v1/demo/measurement/s1"
+
+
+@pytest.fixture
+def configuration(demo: Path) -> Configuration:
+    return load(demo)
+
+
+@pytest.fixture
+def gate(configuration: Configuration) -> Gate:
+    return Gate(configuration, ["measurement"])
+
+
+def payload(configuration: Configuration, **changes: Any) -> bytes:
+    content: dict[str, Any] = {
+        "v": 1, "src": "sensor/s1", "boot": "0" * 16, "seq": 0, "step": 1, "sent_ns": 1, "origin_ns": 1,
+        "model": configuration.digest(), "y": [0.5], "time_ns": 0,
+    }  # fmt: skip
+    return encode(Measurement(**(content | changes)))
+
+
+def test_a_copy_is_counted_and_not_passed_on(gate: Gate, configuration: Configuration) -> None:
+    message = payload(configuration)
+    assert gate.admit(KEY, message) is not None
+    assert gate.admit(KEY, message) is None
+    assert gate.counters == {"received": 1, "duplicates": 1, "gaps": 0}
+
+
+def test_another_boot_starts_its_own_sequence(gate: Gate, configuration: Configuration) -> None:
+    assert gate.admit(KEY, payload(configuration)) is not None
+    assert gate.admit(KEY, payload(configuration, boot="1" * 16)) is not None
+
+
+@pytest.mark.parametrize(
+    ("key", "changes", "reason"),
+    [
+        ("lsu/v1/demo/posterior/box", {}, "key"),
+        ("lsu/v1/other/measurement/s1", {}, "key"),
+        ("lsu/v2/demo/measurement/s1", {}, "key"),
+        (KEY, {"src": "sensor/s2"}, "source"),
+        (KEY, {"src": "filter/s1"}, "source"),
+        ("lsu/v1/demo/measurement/s9", {"src": "sensor/s9"}, "unknown"),
+        (KEY, {"model": "0123456789abcdef"}, "model"),
+        (KEY, {"y": [0.5, 0.5]}, "shape"),
+        (KEY, {"step": 0}, "step"),
+    ],
+)
+def test_what_does_not_belong_here_is_refused_by_reason(
+    gate: Gate, configuration: Configuration, key: str, changes: dict[str, Any], reason: str
+) -> None:
+    assert gate.admit(key, payload(configuration, **changes)) is None
+    assert gate.refused == {reason: 1}
+    assert reason in gate.last_refusal
+
+
+@given(st.permutations(range(30)), st.lists(st.integers(0, 29), max_size=10))
+def test_each_number_passes_exactly_once_in_any_order(order: list[int], copies: list[int]) -> None:
+    sequence = Sequence(order[0])
+    admitted = [seq for seq in [*order, *copies] if sequence.admit(seq)]
+    assert sorted(admitted) == list(range(30))
+    assert sequence.gaps == 0
+
+
+def test_gaps_are_counted_until_they_are_filled() -> None:
+    sequence = Sequence(5)
+    assert sequence.admit(5)
+    assert sequence.admit(9)
+    assert sequence.gaps == 3
+    assert sequence.admit(7)
+    assert sequence.gaps == 2
+    assert sequence.admit(2), "older than the first that came, but never seen"
+    assert sequence.gaps == 2
+
+
+def test_memory_stays_bounded_whatever_numbers_come() -> None:
+    sequence = Sequence(0)
+    for seq in range(0, 2**40, 2**30):
+        sequence.admit(seq)
+    assert sequence.gaps <= 3 * 4096
