@@ -65,16 +65,16 @@ def _all_faults(folder: Path, overrides: Sequence[str], strict: bool, only: str)
             mesh.until(lambda: mesh.is_current(0), "estimates flow")
             outcomes += _each_role(mesh, PEERS_FAULTS, only)
             if only in live_faults.ALL:
-                outcomes.append(_told(live_faults.stand_still(mesh)))
+                outcomes.append(_reported(live_faults.stand_still(mesh)))
             if only in "subscriber":
-                outcomes.append(_told(live_faults.slow_subscriber(mesh)))
+                outcomes.append(_reported(live_faults.slow_subscriber(mesh)))
     if not only or only in "router link bit":
         with LiveMesh(_new(folder / "star"), overrides, star=True) as mesh:
             mesh.until(lambda: mesh.is_current(0), "estimates flow")
             outcomes += _each_role(mesh, STAR_FAULTS, only)
             for number in (signal.SIGKILL, *live_faults.BOTH):
                 outcome, ending = live_faults.router_outage(mesh, number)
-                outcomes.append(_told(outcome))
+                outcomes.append(_reported(outcome))
                 endings += [(number.name, STOP_S, [ending])] if number != signal.SIGKILL else []
     if only in "endings":
         endings += _endings(folder, overrides)
@@ -110,10 +110,10 @@ def _each_role(mesh: LiveMesh, faults: Sequence[Callable[[LiveMesh, str], Outcom
     if shutil.which("ss") is None and live_faults.reset_link in faults:
         print("links are not reset: there is no `ss` here (Debian: iproute2)", file=sys.stderr)
         chosen = [(fault, role) for fault, role in chosen if fault is not live_faults.reset_link]
-    return [_told(fault(mesh, role)) for fault, role in chosen]
+    return [_reported(fault(mesh, role)) for fault, role in chosen]
 
 
-def _told(outcome: Outcome) -> Outcome:
+def _reported(outcome: Outcome) -> Outcome:
     print(outcome.row, flush=True)
     return outcome
 

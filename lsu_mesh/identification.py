@@ -23,7 +23,7 @@ from lsu_mesh.supports.orthotope import Orthotope
 Vector = NDArray[np.float64]
 Learn = Literal["both", "r", "rho", "separate"]
 LEARN: tuple[Learn, ...] = ("both", "r", "rho", "separate")
-MOST_BROKEN = 1000
+MAX_BROKEN = 1000
 """So many reports that break the bounds are named, no more."""
 
 
@@ -182,7 +182,7 @@ def broken_reports(model: LSUModel, data: Record, first: int) -> tuple[Broken, .
                 left[list(rows)] = np.nan
                 continue
             break
-        if len(broken) >= MOST_BROKEN:
+        if len(broken) >= MAX_BROKEN:
             break
         if k + 1 < len(data.Y):
             filter.predict(data.U[k] if data.U.shape[1] else None)

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh
+from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh
 
 from lsu_mesh.mesh.config import load
 
@@ -17,7 +17,7 @@ def main(mesh: str, file: str) -> None:
     """Record 400 steps and close."""
     configuration = load(Path(mesh))
     recorder = Recorder(configuration, Path(file))
-    arrivals = MadeUpMesh(configuration).run(400)
+    arrivals = SyntheticMesh(configuration).run(400)
     for arrival in arrivals:
         recorder.record(*arrival)
         recorder.tick(arrival.arrival_ns)

@@ -45,7 +45,7 @@ class HeadlessViewer:
         self._process: subprocess.Popen[bytes] | None = None
         self._client: ViewerClient | None = None
         self._started = 0.0
-        self._heard: int | None = None
+        self._received_at: int | None = None
 
     @property
     def home(self) -> Path:
@@ -88,7 +88,7 @@ class HeadlessViewer:
         """Open a file or a running recorder, and wait until something is there."""
         client = self._require_client()
         logs = client.get_logs()
-        self._heard = logs[-1].sequence if logs else None
+        self._received_at = logs[-1].sequence if logs else None
         client.open(url)
 
         def is_loaded() -> bool:
@@ -109,7 +109,7 @@ class HeadlessViewer:
                 os.killpg(self._process.pid, signal.SIGCONT)
 
     def tabs(self) -> list[str]:
-        """Names of the tabs of the outermost container."""
+        """EntityPaths of the tabs of the outermost container."""
         blueprint, root = self._root()
         return [_display_name(blueprint, entry) for entry in root["contents"]]
 
@@ -158,7 +158,7 @@ class HeadlessViewer:
         ]
         warnings = [
             f"{entry.level} {entry.target}: {entry.message}"
-            for entry in client.get_logs(self._heard)
+            for entry in client.get_logs(self._received_at)
             if entry.level in ("WARN", "ERROR") and not entry.message.startswith(HARMLESS)
         ]
         return reports + warnings

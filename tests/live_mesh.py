@@ -17,13 +17,13 @@ import psutil
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.commands.keys import make_files
 from lsu_mesh_services.network.certificate_authority import LOOPBACK_HOSTS
-from lsu_mesh_services.network.gap_recovery import Recovery
+from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.security import certificates
 from lsu_mesh_services.supervisor import Child, Supervisor
 from ports import free_port
 from tcp_proxy import Proxy
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.config.settings import SupervisorSettings
 from lsu_mesh.mesh.keys import PREFIX, READER, key
@@ -63,7 +63,7 @@ class Observer:
     alive: set[str] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        self.gate = Gate(self.configuration, TYPES)
+        self.admission = Admission(self.configuration, TYPES)
 
     def take(self, what: str, address: str, payload: bytes, arrival_ns: int) -> None:
         """Note an arrival."""
@@ -72,18 +72,18 @@ class Observer:
             self.tokens.append((arrival_ns, name, what == "alive"))
             (self.alive.add if what == "alive" else self.alive.discard)(name)
             return
-        message = self.gate.admit(address, payload)
+        message = self.admission.admit(address, payload)
         if message is None:
             return
         self.newest[address] = (arrival_ns, message)
         if isinstance(message, Posterior):
-            self.note(Seen(arrival_ns, message))
+            self.record(Seen(arrival_ns, message))
         elif isinstance(message, Health):
             self.health[message.name].append((arrival_ns, message))
         elif isinstance(message, Event):
             self.events.append(message)
 
-    def note(self, seen: Seen) -> None:
+    def record(self, seen: Seen) -> None:
         """Keep an estimate."""
         self.estimates[seen.message.name].append(seen)
 
@@ -200,10 +200,10 @@ class LiveMesh:
         return [*arguments, "-m", "client", "-e", f"tls/127.0.0.1:{proxy.port}"]
 
     def _observe(self) -> None:
-        recovery = Recovery(self.observer.gate, self._bus.ask_cache)
+        recovery = GapRecovery(self.observer.admission, self._bus.ask_cache)
         try:
             while not self._ending.is_set():
-                recovery.look(self.clock.now())
+                recovery.check(self.clock.now())
                 arrival = self._bus.next(0.1)
                 if arrival is not None:
                     self.observer.take(arrival.what, arrival.key, arrival.payload, arrival.arrival_ns)
@@ -297,7 +297,9 @@ class LiveMesh:
         """Messages that are known to be missing now, by peer, with the observer's own."""
         counted = {name: health[-1][1].counters.get("gaps", 0.0) for name, health in self.observer.health.items()}
         dropped = {name: health[-1][1].counters.get("dropped", 0.0) for name, health in self.observer.health.items()}
-        return {name: counted[name] + dropped[name] for name in counted} | {"observer": float(self.observer.gate.gaps)}
+        return {name: counted[name] + dropped[name] for name in counted} | {
+            "observer": float(self.observer.admission.gaps)
+        }
 
     def containment(self, since_ns: int = 0) -> tuple[int, int]:
         """How many estimates hold the truth, and how many there are."""

@@ -17,10 +17,10 @@ from live_mesh import LiveMesh, Observer, Seen, TrueStates, holds
 from lsu_mesh.mesh.messages import decode
 
 MIB = 2**20
-MOST_GROWTH = 0.02
-"""Of a peer's memory from the third quarter of a run to the last, or ``MOST_MIB``, whichever is more."""
-MOST_MIB = 4.0
-LONGEST_LATENCIES = 200_000
+MAX_GROWTH = 0.02
+"""Of a peer's memory from the third quarter of a run to the last, or ``MAX_MIB``, whichever is more."""
+MAX_MIB = 4.0
+MAX_LATENCY_SAMPLES = 200_000
 HEAD = struct.Struct("<qHI")
 """Of each estimate in the file: arrival, lengths of key and payload."""
 
@@ -61,12 +61,12 @@ class Counting(Observer):
             super().take("sample", address, self._file.read(of_payload), arrival_ns)
         self._file.close()
 
-    def note(self, seen: Seen) -> None:
+    def record(self, seen: Seen) -> None:
         message = seen.message
         self.count += 1
         self.inside += holds(message, self.truth[message.step])
         is_first = message.topic == "fused" and message.revision == 0
-        if is_first and message.used and len(self.latencies_ms) < LONGEST_LATENCIES:
+        if is_first and message.used and len(self.latencies_ms) < MAX_LATENCY_SAMPLES:
             self.latencies_ms.append((seen.arrival_ns - message.origin_ns) * 1e-6)
         self.estimates[message.name] = [seen]
 
@@ -102,7 +102,7 @@ class Report:
         return [
             name
             for name, samples in self.memory.items()
-            if self.growth(name) > max(MOST_MIB, MOST_GROWTH * statistics.median(samples))
+            if self.growth(name) > max(MAX_MIB, MAX_GROWTH * statistics.median(samples))
         ]
 
     def is_broken(self) -> bool:
@@ -168,7 +168,7 @@ def soak(folder: Path, overrides: Sequence[str], seconds: float) -> Report:
         )
         lost, loads = mesh.gaps(), (load, os.getloadavg()[0])
     observer.check()
-    lost["observer"] = float(observer.gate.gaps)
+    lost["observer"] = float(observer.admission.gaps)
     cuts = statistics.quantiles(observer.latencies_ms, n=100)
     return Report(
         seconds, mesh.configuration.mesh.rate, observer.count, observer.inside, lost, behind, lag, cuts[49], cuts[98],

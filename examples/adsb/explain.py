@@ -19,7 +19,7 @@ from scipy.sparse import csr_array
 
 HALF_CELL = 12.5
 CLIMB_LIMIT = 150.0
-MOST_ACCELERATION = 8.0
+MAX_ACCELERATION = 8.0
 
 Term = tuple[int, float]
 
@@ -83,8 +83,8 @@ def main(arguments: Sequence[str]) -> int:
     print(f"{arguments[0]}: {len(repeated)} altitudes, {len(reports)} of them new reports; cells of ±{HALF_CELL} ft")
     for name, data in (("all altitudes", repeated), ("new reports", reports)):
         print(f"  {name}, every age 0: explained from |a| <= {smallest(data, offset=0.0, acceleration=None):.1f} ft/s²")
-    least = smallest(reports, offset=None, acceleration=MOST_ACCELERATION)
-    print(f"  new reports, |a| <= {MOST_ACCELERATION:g} ft/s²: explained from an age offset of ±{least:.1f} ft")
+    least = smallest(reports, offset=None, acceleration=MAX_ACCELERATION)
+    print(f"  new reports, |a| <= {MAX_ACCELERATION:g} ft/s²: explained from an age offset of ±{least:.1f} ft")
     print(f"  vertical rates change by up to {largest_change(vectors):.0f} ft/min from one second to the next")
     return 0
 

@@ -21,7 +21,7 @@ from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
-from lsu_mesh.filters.lsup import LARGEST_EXHAUSTIVE, LSUP
+from lsu_mesh.filters.lsup import LSUP, MAX_EXHAUSTIVE_SIZE
 from lsu_mesh.filters.lsupb import LSUPB
 from lsu_mesh.filters.zonotopic_kalman import ZonotopicKalman
 from lsu_mesh.model import LSUModel
@@ -43,7 +43,7 @@ FILTERS: dict[str, Callable[[LSUModel, Orthotope], Filter]] = {
     "LSUCZ unreduced": lambda model, prior: LSUCZ(model, prior, None, None),
     "ZonotopicKalman(15)": ZonotopicKalman,
 }
-MOST_UNREDUCED = 100
+MAX_UNREDUCED = 100
 """Rows up to which the filter without limits is run: its programs grow with every row."""
 
 
@@ -118,8 +118,8 @@ def measure(benchmark: Benchmark, filters: dict[str, Callable[[LSUModel, Orthoto
 def fits(name: str, benchmark: Benchmark) -> bool:
     """Whether a filter of ``FILTERS`` can be run on a benchmark in little time."""
     if "unreduced" in name:
-        return benchmark.last < MOST_UNREDUCED
-    return "edges" not in name or max(benchmark.model.state_count, benchmark.model.rho.size) <= LARGEST_EXHAUSTIVE
+        return benchmark.last < MAX_UNREDUCED
+    return "edges" not in name or max(benchmark.model.state_count, benchmark.model.rho.size) <= MAX_EXHAUSTIVE_SIZE
 
 
 def _follow(benchmark: Benchmark, name: str, make: Callable[[LSUModel, Orthotope], Filter]) -> Tightness:

@@ -23,7 +23,7 @@ Stack = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-SMALLEST_SHARE = 64
+MIN_SHARE = 64
 """Instances below which a thread of its own does not pay."""
 
 
@@ -69,7 +69,7 @@ class FilterBank:
         self._states = np.array([kind._enclose(checked_prior(model_list[0], prior)) for prior in prior_list])
         if len(self._states) != count:
             self._states = np.repeat(self._states, count, axis=0)
-        self._threads = max(1, min(threads or os.cpu_count() or 1, count // SMALLEST_SHARE))
+        self._threads = max(1, min(threads or os.cpu_count() or 1, count // MIN_SHARE))
 
     def __len__(self) -> int:
         """N"""

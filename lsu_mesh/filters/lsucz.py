@@ -35,7 +35,7 @@ LITTLE_GAIN = 0.03
 """Nats below which a transferred set is weighed against what the reduction of the intersection costs."""
 
 
-LARGEST_EXACT_VOLUME = 3
+MAX_EXACT_VOLUME = 3
 """Dimension up to which :meth:`LSUCZ.volume` enumerates vertices; ``support.volume()`` does so up to 6."""
 
 
@@ -130,7 +130,7 @@ class LSUCZ(Filter):
 
     def volume(self) -> float:
         """Volume of :attr:`support` up to dimension 3, above it of :meth:`bounds`: cheap enough for each step."""
-        if self._model.state_count <= LARGEST_EXACT_VOLUME:
+        if self._model.state_count <= MAX_EXACT_VOLUME:
             return self.support.volume()
         return box_volume(*self.bounds())
 

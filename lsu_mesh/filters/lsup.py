@@ -25,7 +25,7 @@ TIME_UPDATES: dict[str, int] = {
     "edges": parallelotope.EDGES,
     "strips": parallelotope.STRIPS,
 }
-LARGEST_EXHAUSTIVE = 6
+MAX_EXHAUSTIVE_SIZE = 6
 """States up to which ``time_update="edges"`` tries all combinations of edges."""
 ROUNDING = 1e-12
 """Share of a bound's size by which a new hull may exceed it and still count as not wider."""
@@ -67,9 +67,9 @@ class LSUP(CompiledFilter):
         if time_update not in TIME_UPDATES:
             raise ModelError(f"time_update must be one of {', '.join(TIME_UPDATES)}, not {time_update!r}")
         n, q = model.state_count, model.rho.size
-        if time_update == "edges" and max(n, q) > LARGEST_EXHAUSTIVE:
+        if time_update == "edges" and max(n, q) > MAX_EXHAUSTIVE_SIZE:
             raise ModelError(
-                f'time_update="edges" tries all combinations of edges, up to {LARGEST_EXHAUSTIVE} states and noises; '
+                f'time_update="edges" tries all combinations of edges, up to {MAX_EXHAUSTIVE_SIZE} states and noises; '
                 f'the model has {n} and {q}: use "cgz" or "strips"'
             )
         super().__init__(model, prior, option=TIME_UPDATES[time_update])

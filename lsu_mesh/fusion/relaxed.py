@@ -24,7 +24,7 @@ from lsu_mesh.supports.support import Support
 Vector = NDArray[np.float64]
 Box = tuple[Vector, Vector]
 
-MOST_FAMILIES = 256
+MAX_FAMILIES = 256
 """Intersections that are formed at most; where there are more the coordinates are treated one by one."""
 
 
@@ -39,7 +39,7 @@ def fuse_relaxed(supports: Sequence[Support], faults: int) -> Fusion:
     if not 0 <= faults < m:
         raise ModelError(f"faults must be at least 0 and less than the number of sources, {m}; it is {faults}")
     bounds = [support.bounds() for support in supports]
-    if math.comb(m, faults) > MOST_FAMILIES:
+    if math.comb(m, faults) > MAX_FAMILIES:
         return _fuse_coordinates(bounds, faults)
     consistent = _consistent_families(supports, bounds, m - faults)
     if not consistent:

@@ -35,7 +35,7 @@ ROLE_OF_TOPIC = {
 }
 WINDOW = 4096
 """How far back in a sequence a message may come late and still be told from a copy."""
-MOST_BOOTS = 16
+MAX_BOOTS = 16
 UNLIMITED = 4096
 
 
@@ -69,7 +69,7 @@ class Sequence:
         return len(self._gaps)
 
 
-class Gate:
+class Admission:
     """Decodes payloads and lets through what this mesh's configuration says may come.
 
     ``counters`` holds ``received``, ``duplicates``, ``gaps`` and ``refused.<reason>``.
@@ -189,7 +189,7 @@ class Gate:
 
     def _forget_old_boots(self, key: str) -> None:
         known = [identity for identity in self._sequences if identity[0] == key]
-        for identity in known[: max(0, len(known) - MOST_BOOTS + 1)]:
+        for identity in known[: max(0, len(known) - MAX_BOOTS + 1)]:
             del self._sequences[identity]
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 PREFIX = "lsu/v1"
 TOPICS = ("truth", "input", "measurement", "prediction", "posterior", "fused", "bounds", "health", "event", "live")
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
-LONGEST = len(PREFIX) + 3 * 65
+MAX_LENGTH = len(PREFIX) + 3 * 65
 """Longest key in characters."""
 NAME_RULE = "1 to 64 ASCII letters, digits, '_', '-' or '.', the first a letter or a digit"
 
@@ -54,7 +54,7 @@ def last_key(mesh: str, name: str) -> str:
 
 def parse(text: str) -> Address | None:
     """The address in a key, or ``None`` when it is no key of this protocol."""
-    return _parsed(text) if len(text) <= LONGEST else None
+    return _parsed(text) if len(text) <= MAX_LENGTH else None
 
 
 @functools.lru_cache(maxsize=4096)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 WINDOW = 4096
 """A number that is still missing when so many later ones have come is given up, and counted as lost."""
 
-MOST_BOOTS = 16
+MAX_BOOTS = 16
 """Earlier lives of a key that are remembered."""
-MOST_HOLES = 256
+MAX_HOLES = 256
 """Holes that are remembered, the newest."""
 
 
@@ -36,15 +36,15 @@ class Ledger:
     def __init__(self) -> None:
         self._runs: dict[str, _Run] = {}
         self._old: dict[str, deque[str]] = {}
-        self._told: dict[str, _Run] = {}
+        self._reported: dict[str, _Run] = {}
         """What ``flushed`` counts; until the next flush that may be an earlier boot."""
         self.flushed: dict[str, int] = {}
 
-    def note(self, key: str, boot: str, seq: int) -> None:
+    def record(self, key: str, boot: str, seq: int) -> None:
         """A message was taken; it is stored with the next flush."""
         run = self._runs.get(key)
         if run is None or run.boot != boot:
-            old = self._old.setdefault(key, deque(maxlen=MOST_BOOTS))
+            old = self._old.setdefault(key, deque(maxlen=MAX_BOOTS))
             if boot in old:
                 return  # a straggler of an earlier life: stored, but that life is not counted any more
             if run is not None:
@@ -57,15 +57,15 @@ class Ledger:
 
     def boot(self, key: str) -> str:
         """The boot that ``flushed`` counts."""
-        return self._told[key].boot
+        return self._reported[key].boot
 
     def first(self, key: str) -> int:
         """The first number that came of that boot."""
-        return self._told[key].first
+        return self._reported[key].first
 
     def lost(self, key: str) -> list[tuple[int, int]]:
         """Holes of that boot that were given up: first and last number of each."""
-        return self._told[key].lost
+        return self._reported[key].lost
 
     def is_lost(self, key: str, seq: int) -> bool:
         """Whether a number of that boot was given up."""
@@ -73,7 +73,7 @@ class Ledger:
 
     def flush(self) -> None:
         """Everything that was noted is stored now."""
-        self._told = dict(self._runs)
+        self._reported = dict(self._runs)
         self.flushed = {key: run.complete for key, run in self._runs.items()}
 
 
@@ -83,7 +83,7 @@ def _complete(run: _Run) -> None:
             if run.newest - run.complete <= WINDOW:
                 return
             following = min(run.beyond)
-            run.lost = [*run.lost[1 - MOST_HOLES :], (run.complete + 1, following - 1)]
+            run.lost = [*run.lost[1 - MAX_HOLES :], (run.complete + 1, following - 1)]
             run.complete = following - 1
         run.complete += 1
         run.beyond.remove(run.complete)

@@ -55,20 +55,20 @@ class HealthObserver:
     def __init__(self, configuration: Configuration, now: int) -> None:
         self._roles = {name: role for role, name in configuration.peers()}
         self._began = now
-        self._heard: dict[str, _Heard] = {}
+        self._received_at: dict[str, _Heard] = {}
         self._gone: set[str] = set()
 
-    def note(self, message: Health, now: int) -> None:
+    def record(self, message: Health, now: int) -> None:
         """A heartbeat; one of an earlier life that comes late does not count."""
-        known = self._heard.get(message.name)
+        known = self._received_at.get(message.name)
         if known is not None:
             before = known.message
             is_older = message.seq <= before.seq if message.boot == before.boot else message.sent_ns < before.sent_ns
             if is_older:
                 return
-        self._heard[message.name] = _Heard(message, now)
+        self._received_at[message.name] = _Heard(message, now)
 
-    def note_presence(self, name: str, is_there: bool) -> None:
+    def record_presence(self, name: str, is_there: bool) -> None:
         """Liveliness of a peer."""
         if is_there:
             self._gone.discard(name)
@@ -77,7 +77,7 @@ class HealthObserver:
 
     def peers(self, now: int) -> list[PeerHealth]:
         """Every peer, in the configuration's order, then others by name."""
-        names = [*self._roles, *sorted(set(self._heard) - set(self._roles))]
+        names = [*self._roles, *sorted(set(self._received_at) - set(self._roles))]
         return [self._judged(name, now) for name in names]
 
     def level(self, now: int) -> Level:
@@ -85,7 +85,7 @@ class HealthObserver:
         return worst([peer.level for peer in self.peers(now)])
 
     def _judged(self, name: str, now: int) -> PeerHealth:
-        heard = self._heard.get(name)
+        heard = self._received_at.get(name)
         if heard is None:
             waited = now - self._began
             is_late = waited >= STALE_NS or name in self._gone

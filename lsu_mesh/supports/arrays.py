@@ -11,7 +11,7 @@ from lsu_mesh.errors import ModelError
 
 Array = NDArray[np.float64]
 
-MOST_EDGES = 16
+MAX_EDGES = 16
 """A box with more edge directions has more than 65 536 corners: they are not enumerated."""
 
 
@@ -67,8 +67,8 @@ def box_volume(lower: Array, upper: Array) -> float:
 
 def corners_are_few(edges: int) -> None:
     """Raises ``ModelError`` where 2^edges corners are too many to be listed."""
-    if edges > MOST_EDGES:
+    if edges > MAX_EDGES:
         raise ModelError(
-            f"a set with {edges} edge directions has 2^{edges} corners, up to 2^{MOST_EDGES} are listed: "
+            f"a set with {edges} edge directions has 2^{edges} corners, up to 2^{MAX_EDGES} are listed: "
             "project it first, as in support.linear_map([[1, 0, …], [0, 1, …]])"
         )

@@ -21,9 +21,9 @@ from lsu_mesh.supports.linear_programs import is_proved_empty, safe_maxima
 from lsu_mesh.supports.polytope import Polytope, enumerate_polytope
 from lsu_mesh.supports.support import Matrix, Support, Vector
 
-MOST_POINTS = 2000
+MAX_POINTS = 2000
 """Vertices that are looked for in one go in three dimensions; those beyond are found in rounds."""
-LARGEST_EXACT_VOLUME = 6
+MAX_EXACT_VOLUME = 6
 """Dimension up to which :meth:`ConstrainedZonotope.volume` is that of the exact polytope."""
 
 
@@ -165,7 +165,7 @@ class ConstrainedZonotope(Support):
         """Volume of the exact polytope up to dimension 6; of the interval hull beyond it, or with too many faces."""
         if self.is_empty():
             return 0.0
-        exact = self._polytope().volume if self.dim <= LARGEST_EXACT_VOLUME else math.nan
+        exact = self._polytope().volume if self.dim <= MAX_EXACT_VOLUME else math.nan
         return box_volume(*self.bounds()) if math.isnan(exact) else exact
 
     def vertices(self) -> Matrix:
@@ -200,7 +200,7 @@ class ConstrainedZonotope(Support):
     def _surface(self, M: Matrix, origin: Vector, corners: Matrix) -> Matrix:
         """Vertices ``M G ξ − origin`` (k, 3) of a solid, from the corners of an inscribed simplex."""
         _, program = open_program(self._A, self._b)
-        return split_triangles(program, M @ self._generators, origin, corners, MOST_POINTS)
+        return split_triangles(program, M @ self._generators, origin, corners, MAX_POINTS)
 
     def _offsets(self, directions: Matrix) -> Matrix:
         """Points ``G ξ`` farthest in the directions (k, n): floating-point answers, for drawing and measuring."""

@@ -30,11 +30,11 @@ FLAT = 1e-11
 """A width below this share of the largest width counts as none."""
 CONFIRMED = 1e-9
 """A facet is confirmed when no point lies farther than this, in units of the inscribed simplex."""
-MOST_VERTICES = 6_000
+MAX_VERTICES = 6_000
 """Where more are found the enumeration stops: in dimension five and six a small set can have millions."""
-MOST_FACETS = 400_000
+MAX_FACETS = 400_000
 """Facets of all rounds together at which it stops too: some seconds of work, whatever the set."""
-LARGEST_DIMENSION = 8
+MAX_DIMENSION = 8
 """Sets that span more dimensions are not enumerated: their simplest hulls have too many facets."""
 
 
@@ -52,9 +52,9 @@ def enumerate_polytope(support_points: SupportPoints, n: int, surface: Surface |
     """
     points, simplex = _inscribed_simplex(support_points, n)
     k = simplex.shape[0] - 1
-    if k > LARGEST_DIMENSION:
+    if k > MAX_DIMENSION:
         raise ModelError(
-            f"the vertices of a set are enumerated up to dimension {LARGEST_DIMENSION}, it spans {k}: "
+            f"the vertices of a set are enumerated up to dimension {MAX_DIMENSION}, it spans {k}: "
             "project it first, as in support.linear_map([[1, 0, …], [0, 1, …]])"
         )
     if k == 0:
@@ -141,7 +141,7 @@ def _refine(
         fresh = np.flatnonzero(beyond)[_distinct(found_local[beyond], local)]
         if fresh.size == 0:
             break
-        if len(local) + fresh.size > MOST_VERTICES or seen + _facets_expected(hull, fresh.size) > MOST_FACETS:
+        if len(local) + fresh.size > MAX_VERTICES or seen + _facets_expected(hull, fresh.size) > MAX_FACETS:
             return points, np.asarray(hull.vertices, dtype=np.int64), math.nan
         points, local = np.vstack([points, found[fresh]]), np.vstack([local, found_local[fresh]])
     return points, np.asarray(hull.vertices, dtype=np.int64), float(hull.volume)

@@ -19,7 +19,7 @@ from lsu_mesh.supports.arrays import box_volume, finite_array, frozen, map_argum
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.support import Matrix, Support, Vector
 
-LARGEST_SUM = 500_000
+MAX_SUM = 500_000
 """Determinants that :meth:`Zonotope.volume` is ready to sum."""
 
 
@@ -74,7 +74,7 @@ class Zonotope(Support):
 
     def volume(self) -> float:
         """``2ⁿ Σ |det G_S|`` over the n-subsets of columns; above 500 000 of them the volume of the interval hull."""
-        if math.comb(self._generators.shape[1], self.dim) > LARGEST_SUM:
+        if math.comb(self._generators.shape[1], self.dim) > MAX_SUM:
             return box_volume(*self.bounds())
         return float(parallelotope_volumes(self._generators))
 

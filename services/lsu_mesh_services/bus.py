@@ -17,13 +17,13 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
-from lsu_mesh_services.network.link_repair import Reunion
-from lsu_mesh_services.network.receive_queue import Arrival, Arrivals
+from lsu_mesh_services.network.link_repair import LinkRepair
+from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
 from lsu_mesh_services.network.security import Certificates
 
 LEASE_MS = 2000
 HEARTBEAT_S = 0.1
-SETTLED_S, LONGEST_INTRODUCTION_S = 0.5, 5.0
+SETTLED_S, MAX_INTRODUCTION_S = 0.5, 5.0
 """A second session leaves the mesh when its links have not changed for so long, and after so long in any case. One that
 is closed while it opens links leaves them open, for as long as its process lives."""
 
@@ -62,11 +62,11 @@ class Bus:
     def __init__(self, settings: SessionSettings, clock: Clock) -> None:
         self._settings = settings
         self._clock = clock
-        self._arrivals = Arrivals()
+        self._arrivals = ReceiveQueue()
         self._publishers: dict[str, Any] = {}
         self._declared: list[Any] = []
         self._own_tokens: set[str] = set()
-        self._reunion: Reunion | None = None
+        self._reunion: LinkRepair | None = None
         try:
             self._session = zenoh.open(_zenoh_configuration(settings))
         except zenoh.ZError as error:
@@ -128,13 +128,13 @@ class Bus:
     def watch_alive(self, key: str) -> None:
         """Queue who is there and who comes and goes, and look for those that only this session does not see."""
         if self._settings.mode == "peer" and self._settings.connect and self._reunion is None:
-            self._reunion = Reunion(lambda: self._alive_elsewhere(key), self._introduce)
+            self._reunion = LinkRepair(lambda: self._alive_elsewhere(key), self._introduce)
 
         def changed(sample: Any) -> None:
             is_there = sample.kind == zenoh.SampleKind.PUT
             self._arrivals.put(Arrival("alive" if is_there else "gone", str(sample.key_expr), b"", self._clock.now()))
             if self._reunion is not None:
-                self._reunion.note(str(sample.key_expr), is_there)
+                self._reunion.record(str(sample.key_expr), is_there)
 
         self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
 
@@ -162,7 +162,7 @@ class Bus:
             with zenoh.open(configuration) as session:
                 begin = changed = time.monotonic()
                 links: set[str] = set()
-                while (now := time.monotonic()) < begin + LONGEST_INTRODUCTION_S:
+                while (now := time.monotonic()) < begin + MAX_INTRODUCTION_S:
                     found = {str(peer) for peer in session.info.peers_zid()}
                     if found != links:
                         links, changed = found, now
@@ -212,7 +212,7 @@ class Bus:
         return self._arrivals.next(timeout)
 
     def waiting(self) -> int:
-        """Arrivals in the queue."""
+        """ReceiveQueue in the queue."""
         return len(self._arrivals)
 
     @property

@@ -29,7 +29,7 @@ READY_S = 60.0
 LINKS_S = 10.0
 """How long to wait for the last connections when all peers are there."""
 START_LEAD_S = 0.3
-MOST_AT_ONCE = 1024
+MAX_AT_ONCE = 1024
 """Messages taken before the children, and whoever says stop, are looked at again, however many more are waiting."""
 QUIET_S = 4.0
 """The run is over when the sources have ended and nothing new has come for so long."""
@@ -72,7 +72,7 @@ class Run:
     began: float = field(default_factory=time.monotonic)
     stopping: bool = False
 
-    def note(self, words: str) -> None:
+    def record(self, words: str) -> None:
         """Remember what happened and when, for the table."""
         self.happened.append(f"{time.monotonic() - self.began:7.2f} s  {words}")
 
@@ -80,17 +80,17 @@ class Run:
         """Take what has come, publish what is due, and look after the children."""
         if self.player is not None:
             timeout = self.player.play(self.bus, self.report, self.clock.now(), timeout)
-        for taken in range(MOST_AT_ONCE):
+        for taken in range(MAX_AT_ONCE):
             arrival = self.bus.next(0 if taken else timeout)
             if arrival is None:
                 break
             self._take(arrival)
         if self.viewer is not None and (words := self.viewer.end_words()):
-            self.note(words)
+            self.record(words)
         for child, words in self.supervisor.watch(time.monotonic()):
-            self.note(words)
+            self.record(words)
             if child.process is not None and child.process.poll() is not None and child.words:
-                self.note(f"last words of {child.label}:\n{child.last_words()}")
+                self.record(f"last words of {child.label}:\n{child.last_words()}")
 
     def _take(self, arrival: Arrival) -> None:
         if arrival.what == "sample":
@@ -104,7 +104,7 @@ class Run:
         elif address.name in self.alive:
             self.alive.discard(address.name)
             if not self.stopping:
-                self.note(f"{address.name} left the mesh")
+                self.record(f"{address.name} left the mesh")
 
 
 def run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None = None) -> int:
@@ -248,18 +248,18 @@ def _await_mesh(run: Run, names: set[str]) -> bool:
     while True:
         run.turn()
         if run.stop:
-            run.note("stopped before the mesh was up")
+            run.record("stopped before the mesh was up")
             return False
         failed = [child for child in run.supervisor.children if child.given_up or child.restarts]
         if failed or time.monotonic() > end:
-            run.note(f"the mesh did not come up; not there: {', '.join(sorted(names - run.alive))}")
+            run.record(f"the mesh did not come up; not there: {', '.join(sorted(names - run.alive))}")
             return False
         if names <= run.alive:
             if all(run.report.links.get(name, 0) >= len(names) for name in names):
                 return True
             patience = patience or time.monotonic() + LINKS_S
             if time.monotonic() > patience:
-                run.note(f"not all peers are connected after {LINKS_S:g} s; going on: {run.report.links}")
+                run.record(f"not all peers are connected after {LINKS_S:g} s; going on: {run.report.links}")
                 return True
 
 
@@ -277,7 +277,7 @@ def _follow(run: Run) -> None:
             if last is not None and run.report.last_step() >= last:
                 return
             if time.monotonic() - changed > QUIET_S and _sources_ended(run, last):
-                run.note(f"nothing new for {QUIET_S:g} s after the sources ended at step {last}")
+                run.record(f"nothing new for {QUIET_S:g} s after the sources ended at step {last}")
                 return
 
 

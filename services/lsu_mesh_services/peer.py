@@ -13,19 +13,19 @@ from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
-from lsu_mesh_services.network.gap_recovery import Recovery
+from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
-LONGEST_WAIT = 0.1
+MAX_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
 
 def run_node(node: Node, settings: SessionSettings, stop: Stop) -> int:
     """Run a node until it is told to stop; returns the exit code."""
     clock = Clock()
-    node.rehearse()
+    node.warm_up()
     gc.collect()
     gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
     with Bus(settings, clock) as bus:
@@ -56,7 +56,7 @@ class Peer:
         self._links = -1
         self._next_look = 0
         self._measured_until = self._worst_queue = self._worst_ns = self._worst_age_ns = 0
-        self._recovery = Recovery(node.gate, bus.ask_cache)
+        self._recovery = GapRecovery(node.admission, bus.ask_cache)
 
     def declare(self) -> None:
         """Publishers, subscriptions, the liveliness token, queries and answers."""
@@ -99,7 +99,7 @@ class Peer:
     def turn(self) -> None:
         """Wait for something to do, then do all of it."""
         self._watch_links()
-        self._recovery.look(self._clock.now(), self._bus.waiting())
+        self._recovery.check(self._clock.now(), self._bus.waiting())
         arrival = self._bus.next(self._patience())
         began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
         age_ns = 0 if arrival is None else began - arrival.arrival_ns
@@ -133,7 +133,7 @@ class Peer:
         links = self._bus.links()
         if links != self._links:
             self._links = links
-            self._node.note_links(links)
+            self._node.record_links(links)
 
     def farewell(self) -> None:
         """A last health message, so that the counts of the whole run are known."""
@@ -142,8 +142,8 @@ class Peer:
     def _patience(self) -> float:
         wakeup = self._node.wakeup()
         if wakeup is None:
-            return LONGEST_WAIT
-        return min(LONGEST_WAIT, max(0.0005, (wakeup - self._clock.now()) * 1e-9))
+            return MAX_WAIT
+        return min(MAX_WAIT, max(0.0005, (wakeup - self._clock.now()) * 1e-9))
 
     def _take(self, arrival: Arrival) -> list[Message]:
         if arrival.what == "sample":

@@ -9,14 +9,14 @@ import sys
 import time
 from pathlib import Path
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
-from lsu_mesh.mesh.nodes.source_timeout import Silences
+from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
-from lsu_mesh_services.network.gap_recovery import Recovery
+from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part
@@ -27,7 +27,7 @@ AFTER_STOP_S = 0.5
 """How long the recorder goes on taking what is under way after it was told to stop, at the most."""
 QUIET_S = 0.2
 """Then nothing is under way any more."""
-MOST_AT_ONCE = 2048
+MAX_AT_ONCE = 2048
 """Messages recorded before the recorder looks up again: at what it is told, and at the time."""
 
 
@@ -82,8 +82,8 @@ class RecorderService:
         self._bus = bus
         self._clock = clock
         self._mesh = configuration.mesh.name
-        self._gate = Gate(configuration, TYPES)
-        self._recovery = Recovery(self._gate, bus.ask_cache)
+        self._gate = Admission(configuration, TYPES)
+        self._recovery = GapRecovery(self._gate, bus.ask_cache)
         self._boot = secrets.token_hex(8)
         self._sequence = 0
         self._next_health = 0
@@ -92,7 +92,7 @@ class RecorderService:
         """The longest queue and turn since the last health message."""
         self._roles = {name: role for role, name in configuration.peers()}
         others = [name for name in self._roles if name != ROLE_NAME]
-        self._silences = Silences(configuration, [("health", name) for name in others], others)
+        self._source_timeouts = SourceTimeouts(configuration, [("health", name) for name in others], others)
         """Everybody tells its health every second; of whom nothing is heard, nothing is recorded."""
 
     def declare(self) -> None:
@@ -107,9 +107,9 @@ class RecorderService:
     def turn(self) -> None:
         """Take what has come, then flush if it is time."""
         began, self._queue = self._clock.now(), max(self._queue, self._bus.waiting())
-        taken = self._take_all(MOST_AT_ONCE)
+        taken = self._take_all(MAX_AT_ONCE)
         now = self._clock.now()
-        self._recovery.look(now, self._bus.waiting())
+        self._recovery.check(now, self._bus.waiting())
         self._recorder.tick(now)
         links = self._bus.links()
         if now >= self._next_health or links != self._links:
@@ -124,10 +124,10 @@ class RecorderService:
         end = time.monotonic() + AFTER_STOP_S
         quiet_since = time.monotonic()
         while (now := time.monotonic()) < end and now - quiet_since < QUIET_S:
-            if self._take_all(MOST_AT_ONCE):
+            if self._take_all(MAX_AT_ONCE):
                 quiet_since = now
         self._bus.close()
-        while self._take_all(MOST_AT_ONCE, 0.0):
+        while self._take_all(MAX_AT_ONCE, 0.0):
             pass
 
     def _take_all(self, most: int, patience: float = 0.05) -> int:
@@ -145,7 +145,7 @@ class RecorderService:
             if message is not None or self._gate.duplicates == duplicates:
                 self._recorder.record(arrival.key, arrival.payload, arrival.arrival_ns, message)
             if isinstance(message, Health) and message.name != ROLE_NAME:
-                self._silences.heard(message.name, arrival.arrival_ns)
+                self._source_timeouts.received(message.name, arrival.arrival_ns)
             return
         address = parse(arrival.key)
         if address is not None:
@@ -154,7 +154,7 @@ class RecorderService:
 
     def _tell_health(self, now: int) -> None:
         problems = list(self._recorder.problems)
-        problems += [complaint.text for complaint in self._silences.complaints(now)]
+        problems += [complaint.text for complaint in self._source_timeouts.complaints(now)]
         if self._bus.dropped:
             problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
         counters = self._gate.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}

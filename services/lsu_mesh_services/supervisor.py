@@ -1,4 +1,4 @@
-"""Starts, watches, restarts and stops its own children, and keeps their last words."""
+"""RestartSearch, watches, restarts and stops its own children, and keeps their last words."""
 
 from __future__ import annotations
 

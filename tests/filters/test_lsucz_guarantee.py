@@ -29,9 +29,9 @@ MAKERS: dict[str, Maker] = {
     "ZonotopicKalman unreduced": lambda model, prior: ZonotopicKalman(model, prior, None),
 }
 every_filter = pytest.mark.parametrize("name", MAKERS)
-LARGEST_EXACT = 24
+MAX_EXACT = 24
 """Generators up to which membership is decided exactly at the steps that ask for it: its cost grows with the cube."""
-LONGEST_UNREDUCED = 7
+MAX_UNREDUCED_STEPS = 7
 """Steps after which a set without limits is given up: its programs grow with every step."""
 
 
@@ -39,7 +39,7 @@ def holds(estimator: Filter, x: Exact, exactly: bool) -> None:
     """The exact state lies in the bounds and in the support; ``exactly``: proved by rational numbers."""
     assert inside_box(*estimator.bounds(), x)
     body = estimator.support.to_constrained_zonotope()
-    if exactly and body.generator_count <= LARGEST_EXACT:
+    if exactly and body.generator_count <= MAX_EXACT:
         assert body.membership(x) is Membership.INSIDE
     assert body.contains([float(v) for v in x]) or body.membership(x) is Membership.INSIDE
 
@@ -47,7 +47,7 @@ def holds(estimator: Filter, x: Exact, exactly: bool) -> None:
 def follow(name: str, case: Case, seed: int, steps: int) -> int:
     """Run a filter against the exact plant, some outputs missing; the number of steps whose sets were checked."""
     estimator, rng, done = MAKERS[name](case.model, case.prior), np.random.default_rng(seed), 0
-    for step in exact_steps(case, rng, min(steps, LONGEST_UNREDUCED) if "unreduced" in name else steps):
+    for step in exact_steps(case, rng, min(steps, MAX_UNREDUCED_STEPS) if "unreduced" in name else steps):
         outputs = exact_product(case.model.C, step.x)
         interval = estimator.predict_output()
         assert inside_box(interval.lower, interval.upper, outputs)
@@ -71,7 +71,7 @@ def test_exact_states_stay_inside(name: str, kind: str, seed: int) -> None:
 def test_exact_states_stay_inside_on_the_papers_systems(name: str, system: str) -> None:
     model = systems.get(system)
     case = Case(model, Orthotope(-np.ones(model.state_count), np.ones(model.state_count)), inside=False)
-    assert follow(name, case, seed=1, steps=10) >= LONGEST_UNREDUCED
+    assert follow(name, case, seed=1, steps=10) >= MAX_UNREDUCED_STEPS
 
 
 @pytest.mark.soak
@@ -92,7 +92,7 @@ def test_a_scaled_copy_gives_the_scaled_sets_bit_by_bit(name: str, exponent: int
     scaled = model.replace(rho=model.rho * scale, r=model.r * scale)
     one = MAKERS[name](model, Orthotope([-1.0] * 3, [1.0] * 3))
     other = MAKERS[name](scaled, Orthotope([-scale] * 3, [scale] * 3))
-    for step in exact_steps(Case(model, Orthotope([-1.0] * 3, [1.0] * 3), inside=True), rng, LONGEST_UNREDUCED):
+    for step in exact_steps(Case(model, Orthotope([-1.0] * 3, [1.0] * 3), inside=True), rng, MAX_UNREDUCED_STEPS):
         one.update(step.y)
         other.update(step.y * scale)
         for plain, larger in zip(one.bounds(), other.bounds(), strict=True):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lsu_mesh.mesh.admission import Gate, Sequence
+from lsu_mesh.mesh.admission import Admission, Sequence
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.messages import Measurement, encode
 
@@ -22,8 +22,8 @@ def configuration(demo: Path) -> Configuration:
 
 
 @pytest.fixture
-def gate(configuration: Configuration) -> Gate:
-    return Gate(configuration, ["measurement"])
+def gate(configuration: Configuration) -> Admission:
+    return Admission(configuration, ["measurement"])
 
 
 def payload(configuration: Configuration, **changes: Any) -> bytes:
@@ -34,14 +34,14 @@ def payload(configuration: Configuration, **changes: Any) -> bytes:
     return encode(Measurement(**(content | changes)))
 
 
-def test_a_copy_is_counted_and_not_passed_on(gate: Gate, configuration: Configuration) -> None:
+def test_a_copy_is_counted_and_not_passed_on(gate: Admission, configuration: Configuration) -> None:
     message = payload(configuration)
     assert gate.admit(KEY, message) is not None
     assert gate.admit(KEY, message) is None
     assert gate.counters == {"received": 1, "duplicates": 1, "gaps": 0}
 
 
-def test_another_boot_starts_its_own_sequence(gate: Gate, configuration: Configuration) -> None:
+def test_another_boot_starts_its_own_sequence(gate: Admission, configuration: Configuration) -> None:
     assert gate.admit(KEY, payload(configuration)) is not None
     assert gate.admit(KEY, payload(configuration, boot="1" * 16)) is not None
 
@@ -61,7 +61,7 @@ def test_another_boot_starts_its_own_sequence(gate: Gate, configuration: Configu
     ],
 )
 def test_what_does_not_belong_here_is_refused_by_reason(
-    gate: Gate, configuration: Configuration, key: str, changes: dict[str, Any], reason: str
+    gate: Admission, configuration: Configuration, key: str, changes: dict[str, Any], reason: str
 ) -> None:
     assert gate.admit(key, payload(configuration, **changes)) is None
     assert gate.refused == {reason: 1}

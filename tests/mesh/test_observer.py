@@ -35,7 +35,7 @@ def observer(configuration: Configuration) -> HealthObserver:
     """Has heard everybody at time 0."""
     observer = HealthObserver(configuration, 0)
     for role, name in configuration.peers():
-        observer.note(heartbeat(f"{role}/{name}"), 0)
+        observer.record(heartbeat(f"{role}/{name}"), 0)
     return observer
 
 
@@ -46,7 +46,7 @@ def level_of(observer: HealthObserver, name: str, now: int) -> str:
 def test_the_worst_level_wins(observer: HealthObserver) -> None:
     assert observer.level(SECOND) == "OK"
     for number, level in enumerate(("WARN", "ERROR"), start=1):
-        observer.note(heartbeat(f"filter/{('box', 'cz')[number - 1]}", level, seq=1), SECOND)
+        observer.record(heartbeat(f"filter/{('box', 'cz')[number - 1]}", level, seq=1), SECOND)
         assert observer.level(SECOND) == level
     assert [worst(LEVELS[: i + 1]) for i in range(4)] == list(LEVELS)
     assert worst([]) == "OK"
@@ -55,15 +55,15 @@ def test_the_worst_level_wins(observer: HealthObserver) -> None:
 def test_a_peer_whose_heartbeats_stop_is_stale_until_the_next(observer: HealthObserver) -> None:
     assert level_of(observer, "box", STALE_NS - 1) == "OK"
     assert level_of(observer, "box", STALE_NS) == "STALE"
-    observer.note(heartbeat("filter/box", seq=1), STALE_NS)
+    observer.record(heartbeat("filter/box", seq=1), STALE_NS)
     assert level_of(observer, "box", STALE_NS) == "OK"
 
 
 def test_a_peer_that_has_left_is_stale_at_once(observer: HealthObserver) -> None:
-    observer.note_presence("s1", False)
+    observer.record_presence("s1", False)
     peer = next(peer for peer in observer.peers(1) if peer.name == "s1")
     assert (peer.level, peer.reasons[0]) == ("STALE", "left the mesh")
-    observer.note_presence("s1", True)
+    observer.record_presence("s1", True)
     assert level_of(observer, "s1", 1) == "OK"
 
 
@@ -75,8 +75,8 @@ def test_a_peer_that_was_never_heard_is_stale_after_a_while(configuration: Confi
 
 
 def test_a_heartbeat_of_an_earlier_life_does_not_count(observer: HealthObserver) -> None:
-    observer.note(heartbeat("filter/box", "ERROR", boot="b" * 16, sent_ns=10), 1)
-    observer.note(heartbeat("filter/box", "OK", seq=5, boot="a" * 16, sent_ns=9), 2)
+    observer.record(heartbeat("filter/box", "ERROR", boot="b" * 16, sent_ns=10), 1)
+    observer.record(heartbeat("filter/box", "OK", seq=5, boot="a" * 16, sent_ns=9), 2)
     assert level_of(observer, "box", 3) == "ERROR"
 
 

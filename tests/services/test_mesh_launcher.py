@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lsu_mesh_services.bus import Clock
-from lsu_mesh_services.mesh_launcher import MOST_AT_ONCE, Run
+from lsu_mesh_services.mesh_launcher import MAX_AT_ONCE, Run
 from lsu_mesh_services.monitoring.run_report import RunReport
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.supervisor import Supervisor
@@ -36,5 +36,5 @@ def test_a_flood_does_not_keep_a_run_from_looking_at_its_children_and_at_who_say
     run = Run(configuration, argparse.Namespace(), supervisor, flood, Clock(), stop, RunReport(configuration), None)
     run.turn()
     assert len(looked) == 1
-    assert flood.taken == MOST_AT_ONCE
+    assert flood.taken == MAX_AT_ONCE
     assert run.alive == {"cz"}

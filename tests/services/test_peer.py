@@ -16,14 +16,14 @@ from lsu_mesh.mesh.messages import VERSION, Health, Input, encode, encoding
 from lsu_mesh.mesh.nodes.filter import FilterNode
 
 pytestmark = pytest.mark.live
-MOST_AT_ONCE = 200
-FLOOD = 3 * MOST_AT_ONCE
+MAX_AT_ONCE = 200
+FLOOD = 3 * MAX_AT_ONCE
 
 
 def test_a_flood_does_not_keep_a_peer_from_its_steps_and_it_says_how_long_messages_wait(
     demo: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(FilterNode, "takes_at_once", MOST_AT_ONCE)
+    monkeypatch.setattr(FilterNode, "takes_at_once", MAX_AT_ONCE)
     configuration = load(demo, ["mesh.steps=100000"])
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     clock = Clock()
@@ -46,7 +46,7 @@ def test_a_flood_does_not_keep_a_peer_from_its_steps_and_it_says_how_long_messag
         steps = []
         for turn in range(1, 4):
             peer.turn()
-            assert turn * MOST_AT_ONCE - 10 <= node.gate.received <= turn * MOST_AT_ONCE, "no more at once"
+            assert turn * MAX_AT_ONCE - 10 <= node.admission.received <= turn * MAX_AT_ONCE, "no more at once"
             steps.append(node.step())
         assert steps == sorted(steps)
         assert steps[0] > 0, "it has begun before all was taken"
@@ -54,5 +54,5 @@ def test_a_flood_does_not_keep_a_peer_from_its_steps_and_it_says_how_long_messag
         assert isinstance(health, Health)
         assert health.level == "WARN"
         assert any("in its queue" in reason for reason in health.reasons), health.reasons
-        assert health.counters["queue"] >= FLOOD - MOST_AT_ONCE
+        assert health.counters["queue"] >= FLOOD - MAX_AT_ONCE
         assert health.counters["queue_ms"] >= 600.0

@@ -69,7 +69,7 @@ def farthest(drawn: ConstrainedZonotope, direction: Array) -> float:
 @pytest.mark.usefixtures("hurried")
 def test_a_set_of_more_facets_than_are_looked_at_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its vertices are some of the true ones, and its volume is that of the hull."""
-    monkeypatch.setattr(polytope, "MOST_FACETS", 2_000)
+    monkeypatch.setattr(polytope, "MAX_FACETS", 2_000)
     rng = np.random.default_rng(1)
     drawn = Zonotope(np.zeros(6), rng.normal(size=(6, 40))).to_constrained_zonotope()
     vertices, direction = drawn.vertices(), rng.normal(size=6)

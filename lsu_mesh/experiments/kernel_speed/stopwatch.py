@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
-MOST_CALLS = 100_000
+MAX_CALLS = 100_000
 
 
 class Candidate(NamedTuple):
@@ -62,8 +62,8 @@ def _calls(candidate: Candidate, seconds: float) -> int:
     calls = 1
     while True:
         taken = _seconds(candidate, calls)
-        if taken >= 0.2 * seconds or calls >= MOST_CALLS:
-            return max(1, min(MOST_CALLS, round(calls * seconds / max(taken, 1e-9))))
+        if taken >= 0.2 * seconds or calls >= MAX_CALLS:
+            return max(1, min(MAX_CALLS, round(calls * seconds / max(taken, 1e-9))))
         calls *= 4
 
 

@@ -9,7 +9,7 @@ from lsu_mesh.experiments.l2019.claims import claims
 from lsu_mesh.experiments.l2019.criteria import START, TRANSIENT, Job, criteria, with_zonotopes
 from lsu_mesh.experiments.l2019.figures import figures
 from lsu_mesh.experiments.l2019.overlap import EVERY, SIGNED, overlap
-from lsu_mesh.experiments.l2019.seeds import LARGEST, SMALLEST, of_seeds, ratios
+from lsu_mesh.experiments.l2019.seeds import MAX_RATIO, MIN_RATIO, of_seeds, ratios
 from lsu_mesh.experiments.l2019.surfaces import Surfaces, every_cell, filters, ranges
 from lsu_mesh.experiments.outcome import Check, Outcome
 from lsu_mesh.experiments.workers import Watch, part, spread, unwatched
@@ -103,8 +103,8 @@ def checks(surfaces: Surfaces, thin: Surfaces, steps: int) -> list[Check]:
     outputs = surfaces.of("S2", "T3") / surfaces.of("S2", "T4")
     right = surfaces.of("S1", "T4") / surfaces.of("S1", "T3")
     of_the_full_record = [
-        Check("l2019: S2, output TNSE LSUO ÷ LSUP, smallest cell", float(outputs.min()), SMALLEST, "at least"),
-        Check("l2019: S2, output TNSE LSUO ÷ LSUP, largest cell", float(outputs.max()), LARGEST),
+        Check("l2019: S2, output TNSE LSUO ÷ LSUP, smallest cell", float(outputs.min()), MIN_RATIO, "at least"),
+        Check("l2019: S2, output TNSE LSUO ÷ LSUP, largest cell", float(outputs.max()), MAX_RATIO),
     ]
     return [
         Check("l2019: states or outputs outside, any filter and cell, %", outside, 0.0),

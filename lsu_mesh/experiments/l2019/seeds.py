@@ -15,7 +15,7 @@ from lsu_mesh.experiments.outcome import Spread
 from lsu_mesh.experiments.workers import Watch, spread, unwatched
 
 SEEDS = 10
-SMALLEST, LARGEST = 75.0, 410.0
+MIN_RATIO, MAX_RATIO = 75.0, 410.0
 """The range to reach, T3 ÷ T4 of S2 over the grid."""
 NOISE = 0.1
 """ρ and r of the corner in which the ratio is about the smallest."""
@@ -41,12 +41,12 @@ def ratios(seed: int, runs: int, steps: int, watch: Watch = unwatched) -> dict[i
 
 def of_seeds(found: dict[int, float]) -> Row:
     """Whether every seed reaches the range, and which do not."""
-    below = [seed for seed, value in found.items() if value < SMALLEST]
+    below = [seed for seed, value in found.items() if value < MIN_RATIO]
     values = Spread.of(list(found.values()))
     return stated(
-        ("S2", f"T3 ÷ T4 at ρ = r = {NOISE:g}, seeds {min(found)} to {max(found)}, {SMALLEST:g} at least"),
+        ("S2", f"T3 ÷ T4 at ρ = r = {NOISE:g}, seeds {min(found)} to {max(found)}, {MIN_RATIO:g} at least"),
         "about 100", values, holds=not below,
-        why=f"seeds {_listed(below)} are below {SMALLEST:g}, down to {min(found.values()):.3g}: LSUO's error is a "
+        why=f"seeds {_listed(below)} are below {MIN_RATIO:g}, down to {min(found.values()):.3g}: LSUO's error is a "
         "random walk of the velocity, whose size depends on the draw",
     )  # fmt: skip
 

@@ -31,11 +31,11 @@ ACCEPTED_GAP = 1e-7
 """Largest gap between objective and its lower bound, as a share of the objective."""
 ACCEPTED_SHARE = 1e-8
 """… plus this share of the size of the data."""
-LARGEST_SHARE = 1e-6
+MAX_SHARE = 1e-6
 """Where not, the better answer of both solvers counts if its gap is at most this share of the size of the data."""
 ACCEPTED_VIOLATION = 1e-7
 """Largest violation of a row that has no half-width of its own, as a share of the data's scale."""
-MOST_ITERATIONS = 60
+MAX_ITERATIONS = 60
 
 
 class UnsolvedProgram(LsuMeshError):
@@ -152,16 +152,16 @@ class WindowProgram:
         start[:count], start[count : count + data.theta.size] = data.X.ravel(), data.theta
         if point == "centre":
             iterations, z, value, bound, violation, scale = solve_window(
-                rows, limits, start, count, 2 * data.X.shape[1] - 1, MOST_ITERATIONS
+                rows, limits, start, count, 2 * data.X.shape[1] - 1, MAX_ITERATIONS
             )
             if _is_accepted(value, bound, violation, scale, ACCEPTED_SHARE):
                 return self._solution(z, data, value, bound, iterations, "interior-point")
         solution, share = self._by_highs(rows, limits, data, point)
         if point == "centre" and violation <= ACCEPTED_VIOLATION * scale and value - bound < share * scale:
             solution, share = self._solution(z, data, value, bound, iterations, "interior-point"), 0.0
-        if share > LARGEST_SHARE and point == "vertex":
+        if share > MAX_SHARE and point == "vertex":
             return self.solve(data, "centre", cost)
-        if share > LARGEST_SHARE:
+        if share > MAX_SHARE:
             raise UnsolvedProgram(
                 f"the window's program was not solved: objective {solution.objective:.6g}, "
                 f"lower bound {solution.bound:.6g}"

@@ -23,7 +23,7 @@ Matrix = NDArray[np.float64]
 Counts = NDArray[np.int64]
 REWEIGHTINGS = 4
 """How often the weights of ``objective="log"`` are made anew."""
-SMALLEST_SHARE = 1e-3
+MIN_SHARE = 1e-3
 """A half-width below this share of the largest weighs no more than one of this share."""
 
 
@@ -216,7 +216,7 @@ class WindowMAP(Filter):
         if self._objective == "log":
             for _ in range(REWEIGHTINGS):
                 widths = np.concatenate([solution.rho, solution.r])
-                floor = SMALLEST_SHARE * widths.max(initial=0.0)
+                floor = MIN_SHARE * widths.max(initial=0.0)
                 if floor == 0.0:
                     break
                 solution = self._program.solve(data, self._point, floor / np.maximum(widths, floor))

@@ -31,7 +31,7 @@ OPTIMAL = 1e-13
 """Reduced costs below this share of the largest entry of the objective count as zero."""
 PIVOT = 1e-11
 """Entries of the entering column below this cannot become a pivot."""
-LARGEST_SCALE = 2.0**200
+MAX_SCALE = 2.0**200
 """Columns are lengthened no more than that, so that objectives stay finite."""
 DEPENDENT = 1e-12
 """A row that the variables left can move no more than this depends on the others (rows are scaled to 1)."""
@@ -59,7 +59,7 @@ def balanced(A: Array, b: Array) -> tuple[Array, Array, Array]:
         largest = 0.0
         for i in range(m):
             largest = max(largest, abs(rows[i, j]))
-        factor = min(unit_factor(largest), LARGEST_SCALE)
+        factor = min(unit_factor(largest), MAX_SCALE)
         reach[j] = 1.0 / factor
         for i in range(m):
             rows[i, j] *= factor

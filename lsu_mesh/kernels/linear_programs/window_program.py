@@ -35,7 +35,7 @@ SHARE = 0.95
 """Share of a half-width's cost that its rows carry at the start; the rest goes to its limit."""
 GAP = 1e-8
 """Complementarity at the end, as a share of the objective."""
-SMALLEST = 1e-10
+MIN_VALUE = 1e-10
 """… and as a share of the size of the data, where these are almost without noise."""
 NARROWEST = 1e-3
 """No half-width starts below this share of the size of the data."""
@@ -58,7 +58,7 @@ def solve_window(
         if i < count or i >= widths:
             z[i] /= scale
     point = _starting_point(inner_rows, inner_limits, z, count, widths)
-    iterations = improve(inner_rows, inner_limits, point, count, reach, GAP, SMALLEST, most)
+    iterations = improve(inner_rows, inner_limits, point, count, reach, GAP, MIN_VALUE, most)
     for i in range(z.size):
         z[i] = point.z[i] * (scale if i < count or i >= widths else 1.0)
     z, violation = restored(rows, limits, z, count)

@@ -32,7 +32,7 @@ from lsu_mesh.kernels.runtime.scratch import (
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
-MOST_COMBINATIONS = 924.0
+MAX_COMBINATIONS = 924.0
 """Combinations that an exhaustive search tries: those of 6 among 12 edges. More come of unknown inputs only."""
 
 
@@ -40,7 +40,7 @@ MOST_COMBINATIONS = 924.0
 def choose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, exhaustive: bool, work: Scratch) -> None:
     """Edges that leave little volume: greedy swaps, or ``exhaustive`` the best n of all candidates.
 
-    Greedy too where there are more than ``MOST_COMBINATIONS``. Afterwards T holds the chosen edges; ``candidates_of``
+    Greedy too where there are more than ``MAX_COMBINATIONS``. Afterwards T holds the chosen edges; ``candidates_of``
     and ``weights_of`` the scratch are the other generators of ``T ⊕ G diag(widths)``; the rounding of the products
     went to delta.
     Source: Chisci, Garulli & Zappa 1996, theorem 1.
@@ -63,7 +63,7 @@ def choose(T: Matrix, G: Matrix, widths: Vector, delta: Vector, exhaustive: bool
         for q in range(count, n + widths.size):
             candidates[i, q] = 0.0
         delta[i] = up(delta[i] + EPSILON * rounded)
-    if exhaustive and _combinations(n, count) <= MOST_COMBINATIONS:
+    if exhaustive and _combinations(n, count) <= MAX_COMBINATIONS:
         _find_best(candidates, count, chosen, best, edges, inverse, factor)
     else:
         for q in range(n, count):

@@ -22,7 +22,7 @@ from lsu_mesh.kernels.runtime.scratch import BASIS, ENCLOSE, FACTOR, INVERSE, Sc
 Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
-LARGEST_RESIDUAL = 0.25
+MAX_RESIDUAL = 0.25
 """An approximate inverse with a larger ‖I − M T‖∞ is not used."""
 
 
@@ -157,7 +157,7 @@ def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Ma
     largest = 0.0
     for i in range(n):
         residual[i] = residual_row(M, V, i)
-        if not residual[i] <= LARGEST_RESIDUAL:
+        if not residual[i] <= MAX_RESIDUAL:
             return False
         largest = max(largest, residual[i])
     _solve_bound(grown, residual, largest, first)

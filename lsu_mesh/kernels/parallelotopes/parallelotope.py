@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.kernels.parallelotopes.edge_selection import choose
-from lsu_mesh.kernels.parallelotopes.enclosure import LARGEST_RESIDUAL, enclose, inflate, residual_row
+from lsu_mesh.kernels.parallelotopes.enclosure import MAX_RESIDUAL, enclose, inflate, residual_row
 from lsu_mesh.kernels.parallelotopes.strip_update import EMPTY, OVERFLOW, STRIP_ROWS, UNCHANGED, cut
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 from lsu_mesh.kernels.runtime.linear_algebra import invert
@@ -122,7 +122,7 @@ def faces(c: Vector, T: Matrix, P: Matrix, y: Vector, r: Vector, factor: Matrix)
         return False
     for i in range(n):
         residual = residual_row(P, T, i)
-        if not residual <= LARGEST_RESIDUAL:
+        if not residual <= MAX_RESIDUAL:
             return False
         s, magnitude = 0.0, 0.0
         for k in range(n):

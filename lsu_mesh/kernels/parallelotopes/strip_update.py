@@ -30,7 +30,7 @@ STRIP_ROWS = 3
 TIE = 1.0 + 1e-9
 """A strip that cuts one face only leaves two choices of equal volume: rounding must not decide, the old edges stay."""
 
-SMALLEST_DIVISOR = 1e-150
+MIN_DIVISOR = 1e-150
 """Below it an edge is never replaced: the quotients could overflow."""
 
 
@@ -92,7 +92,7 @@ def cut(c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, wo
         return EMPTY
     low = max(low, -spread)
     high = min(high, spread)
-    if widest > (high - low) * TIE and abs(g[k]) > SMALLEST_DIVISOR:
+    if widest > (high - low) * TIE and abs(g[k]) > MIN_DIVISOR:
         _replace_edge(c, T, delta, k, low, high, g, mid, half)
         return REPLACED
     if tightened:

@@ -11,7 +11,7 @@ from lsu_mesh.kernels.zonotopes.lifted_zonotope import row_scales
 
 Array = NDArray[np.float64]
 
-SMALLEST_PIVOT = 2.0**-10
+MIN_PIVOT = 2.0**-10
 """Entries of a scaled constraint row below this are not used to eliminate a variable."""
 
 
@@ -55,7 +55,7 @@ def overruns(n: int, L: Array, middle: Array, row_of: NDArray[np.int64], beyond:
             total += abs(L[i, k])
         for j in range(g):
             pivot = abs(L[i, j])
-            if pivot >= SMALLEST_PIVOT:
+            if pivot >= MIN_PIVOT:
                 over = max(0.0, (total - pivot) / pivot - 1.0)
                 if over < beyond[j]:
                     row_of[j], beyond[j] = i, over

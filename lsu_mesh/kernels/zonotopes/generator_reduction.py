@@ -13,7 +13,7 @@ from lsu_mesh.kernels.zonotopes.lifted_zonotope import row_scales
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-SMALLEST_PIVOT = 1e-9
+MIN_PIVOT = 1e-9
 """A row whose scaled entries are all below this after elimination is not reached by the columns."""
 FLOOR = 1e-13
 """Length, as a share of the row, of the axis that is added for such a row."""
@@ -80,7 +80,7 @@ def independent_columns(L: Array) -> tuple[Array, Indices]:
         for j in range(g):
             W[i, j] = L[i, j] / scale[i] if scale[i] > 0.0 else 0.0
     for _ in range(N):
-        best, p, q = SMALLEST_PIVOT, -1, -1
+        best, p, q = MIN_PIVOT, -1, -1
         for i in range(N):
             if origin[i] < 0:
                 row = W[i]

@@ -20,16 +20,16 @@ from lsu_mesh.errors import LsuMeshError
 if TYPE_CHECKING:
     from lsu_mesh.mesh.config.settings import MeasurementFileSettings
 
-MOST_SHOWN = 20
+MAX_SHOWN = 20
 
 
 class FileProblems(LsuMeshError):
     """A measurement file is wrong; ``lines`` say file, line, column, value and remedy."""
 
     def __init__(self, lines: Sequence[str]) -> None:
-        shown = list(lines[:MOST_SHOWN])
-        if len(lines) > MOST_SHOWN:
-            shown.append(f"{lines[0].split(': ')[0]}: and {len(lines) - MOST_SHOWN} more mistakes of this kind")
+        shown = list(lines[:MAX_SHOWN])
+        if len(lines) > MAX_SHOWN:
+            shown.append(f"{lines[0].split(': ')[0]}: and {len(lines) - MAX_SHOWN} more mistakes of this kind")
         super().__init__("\n".join(shown))
         self.lines = shown
 

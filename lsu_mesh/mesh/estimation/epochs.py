@@ -13,7 +13,7 @@ from lsu_mesh.mesh.messages import Mark, Posterior, Prediction
 
 Peer = tuple[str, str]
 """``(src, boot)``: epochs of a process that was started again are counted anew."""
-MOST_BOOTS = 16
+MAX_BOOTS = 16
 """Boots of one source whose epochs are remembered."""
 
 
@@ -37,7 +37,7 @@ class Epochs:
         """A source that has abandoned an epoch from which the own set descends, or ``None``."""
         return next((src for (src, boot), n in sorted(self._relied.items()) if n < self._newest[src, boot]), None)
 
-    def note(self, message: Posterior | Prediction) -> None:
+    def record(self, message: Posterior | Prediction) -> None:
         """Learn which epochs there are."""
         for src, boot, number in _marks(message):
             self._newest[src, boot] = max(number, self._newest.get((src, boot), 0))
@@ -51,7 +51,7 @@ class Epochs:
         """Whether the message's set descends from the own present epoch."""
         return (*self._own, self.number) in message.descent
 
-    def rely(self, message: Posterior | Prediction) -> None:
+    def add_dependency(self, message: Posterior | Prediction) -> None:
         """Note that the message's set went into the own one."""
         for src, boot, number in _marks(message):
             if (src, boot) != self._own:
@@ -69,10 +69,10 @@ class Epochs:
         self.number = self._newest[self._own] = max(self.number, number)
 
     def _forget_old_boots(self, src: str) -> None:
-        if len(self._newest) <= MOST_BOOTS:
+        if len(self._newest) <= MAX_BOOTS:
             return
         boots = [peer for peer in self._newest if peer[0] == src and peer != self._own and peer not in self._relied]
-        for peer in boots[: max(0, len(boots) - MOST_BOOTS)]:
+        for peer in boots[: max(0, len(boots) - MAX_BOOTS)]:
             del self._newest[peer]
 
 

@@ -11,7 +11,7 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
 
 
-class Reach:
+class OpenLoop:
     """The reachable box ``X_{k+1} = |A| X_k ⊕ B u_k ⊕ N box(rho)`` of the prior, met with the domain; no data in it.
 
     It is lost when a node starts from anything but the prior, when an input is lost, or when it has outgrown double

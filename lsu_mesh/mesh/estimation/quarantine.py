@@ -43,7 +43,7 @@ class Quarantine:
         """Of each later step, the sources that were there, and whether they were left out."""
         self.members: set[str] = set()
 
-    def note(self, k: int, left_out: Collection[str], agreed: Collection[str], say: Say) -> list[Message]:
+    def record(self, k: int, left_out: Collection[str], agreed: Collection[str], say: Say) -> list[Message]:
         """Note step k; the events of who goes in and who comes out."""
         verdict = dict.fromkeys(agreed, False) | dict.fromkeys(left_out, True)
         self._verdicts[k] = verdict

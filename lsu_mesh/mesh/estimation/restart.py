@@ -12,7 +12,7 @@ from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.estimation.epochs import Epochs
 from lsu_mesh.mesh.estimation.inconsistency import explains
 from lsu_mesh.mesh.estimation.step_record import Base
-from lsu_mesh.mesh.estimation.transfer import OLDEST_BOX, SOUND
+from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, SOUND
 from lsu_mesh.mesh.messages import Fused, Input, Reference
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.orthotope import Orthotope
@@ -35,14 +35,14 @@ class Start:
         return "declared" if self.message is None else self.message.guarantee
 
 
-class Starts:
+class RestartSearch:
     """Remembers the newest sound set of each fusion, and finds one that meets the data."""
 
     def __init__(self, epochs: Epochs) -> None:
         self._epochs = epochs
         self._fused: dict[str, Fused] = {}
 
-    def note(self, message: Fused) -> None:
+    def record(self, message: Fused) -> None:
         """Remember a fused set if it is sound and not older than the known one."""
         known = self._fused.get(message.name)
         if message.status in SOUND and (known is None or message.step >= known.step):
@@ -83,7 +83,7 @@ class Starts:
         self, engine: Filter, fused: Fused, k: int, inputs: Mapping[int, Input], abandons: bool
     ) -> Start | None:
         """A fused set of step k or before, carried to step k."""
-        if not k - OLDEST_BOX <= fused.step <= k or self._epochs.is_abandoned(fused):
+        if not k - MAX_BOX_AGE <= fused.step <= k or self._epochs.is_abandoned(fused):
             return None
         if abandons and self._epochs.is_descendant(fused):
             return None

@@ -6,10 +6,10 @@ from bisect import bisect_left
 
 FURTHEST = 4096
 """So many steps, and four times those that the rate allows since the last message, a message may lie ahead."""
-MOST_SIGNS = 65536
+MAX_SIGNS = 65536
 
 
-class Signs:
+class StepArrivals:
     """The newest step, and when each step that was the newest was first heard of.
 
     Parameters
@@ -31,14 +31,14 @@ class Signs:
         passed = 0 if self.heard_at is None else max(0, now - self.heard_at)
         return k > self.newest + FURTHEST + int(4 * passed * self._rate)
 
-    def note(self, k: int, now: int) -> None:
+    def record(self, k: int, now: int) -> None:
         """Step k was heard of."""
         self.heard_at = now
         if k > self.newest:
             self.newest = k
             self._known.append((k, now))
-            if len(self._known) > MOST_SIGNS:
-                del self._known[: MOST_SIGNS // 2]
+            if len(self._known) > MAX_SIGNS:
+                del self._known[: MAX_SIGNS // 2]
 
     def of(self, k: int) -> int | None:
         """When step k, or one after it, was first heard of."""

@@ -46,7 +46,7 @@ class Combined:
     gain: float | None = None
 
 
-def news(posterior: Posterior) -> tuple[object, ...]:
+def published_content(posterior: Posterior) -> tuple[object, ...]:
     """What makes a step worth telling again when it changes: the set, what it is worth, and who is missing in it."""
     box = posterior.lower, posterior.upper
     return posterior.support, box, posterior.status, posterior.epoch, posterior.guarantee, posterior.missing

@@ -30,9 +30,9 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
 SOUND = ("ok", "predicted")
-OLDEST_BOX = 16
+MAX_BOX_AGE = 16
 """A fused box that is older than so many steps is not carried forward any more."""
-MOST_STEPS = 4096
+MAX_STEPS = 4096
 """Steps whose messages are kept while the filter waits for something else."""
 
 
@@ -45,7 +45,7 @@ class Transfer:
         self._predictions: dict[int, dict[str, Prediction]] = {}
         self._fused: dict[int, dict[str, Fused]] = {}
 
-    def note(self, message: Message) -> None:
+    def record(self, message: Message) -> None:
         """Remember a prediction or a fused set."""
         if isinstance(message, Prediction) and self.way in ("predictor", "data-predictor"):
             self._predictions.setdefault(message.step, {})[message.name] = message
@@ -55,7 +55,7 @@ class Transfer:
             if known is None or known.boot != message.boot or known.seq < message.seq:
                 boxes[message.name] = message
         for kept in (self._predictions, self._fused):
-            while len(kept) > MOST_STEPS:
+            while len(kept) > MAX_STEPS:
                 del kept[next(iter(kept))]
 
     def forget_before(self, k: int) -> None:
@@ -71,7 +71,7 @@ class Transfer:
         if self.way in ("predictor", "data-predictor"):
             predictions = sorted(self._predictions.get(k, {}).items())
             return [message for _, message in predictions if not epochs.is_abandoned(message)]
-        for j in range(k - 1, max(0, k - 1 - OLDEST_BOX), -1):
+        for j in range(k - 1, max(0, k - 1 - MAX_BOX_AGE), -1):
             if needs_inputs and j not in inputs:
                 return []
             boxes = [message for _, message in sorted(self._fused.get(j, {}).items()) if message.status in SOUND]

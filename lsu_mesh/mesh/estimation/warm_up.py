@@ -8,7 +8,7 @@ import numpy as np
 
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.mesh.estimation.open_loop import Reach
+from lsu_mesh.mesh.estimation.open_loop import OpenLoop
 from lsu_mesh.mesh.sets import to_message
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
@@ -17,17 +17,17 @@ REHEARSED_STEPS = 6
 """So many steps bring a limited complexity into play."""
 
 
-def rehearse(engine: Filter, input_box: Orthotope | None) -> None:
+def warm_up(engine: Filter, input_box: Orthotope | None) -> None:
     """Do everything that a node asks of its filter; the filter is left as it was."""
-    before, reach = engine.snapshot(), Reach(engine.model)
+    before, reach = engine.snapshot(), OpenLoop(engine.model)
     reach.begin(engine.support.interval_hull())
     with suppress(InconsistentData, UnboundedSupport):  # without the real inputs a state may leave its domain
         for number in range(REHEARSED_STEPS):
-            _rehearse_step(engine, reach, input_box if number % 2 else None, starts=number % 3 == 2)
+            _warm_up_step(engine, reach, input_box if number % 2 else None, starts=number % 3 == 2)
     engine.restore(before)
 
 
-def _rehearse_step(engine: Filter, reach: Reach, input_box: Orthotope | None, *, starts: bool) -> None:
+def _warm_up_step(engine: Filter, reach: OpenLoop, input_box: Orthotope | None, *, starts: bool) -> None:
     model = engine.model
     if model.output_count:
         engine.update(engine.predict_output().point)

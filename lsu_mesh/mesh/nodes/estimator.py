@@ -16,10 +16,10 @@ from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.epochs import Epochs
-from lsu_mesh.mesh.estimation.open_loop import Reach
-from lsu_mesh.mesh.estimation.step_arrivals import Signs
-from lsu_mesh.mesh.estimation.step_record import Base, Combined, Step, news
-from lsu_mesh.mesh.estimation.warm_up import rehearse
+from lsu_mesh.mesh.estimation.open_loop import OpenLoop
+from lsu_mesh.mesh.estimation.step_arrivals import StepArrivals
+from lsu_mesh.mesh.estimation.step_record import Base, Combined, Step, published_content
+from lsu_mesh.mesh.estimation.warm_up import warm_up
 from lsu_mesh.mesh.messages import (
     Bounds,
     Guarantee,
@@ -31,7 +31,7 @@ from lsu_mesh.mesh.messages import (
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
-from lsu_mesh.mesh.nodes.source_timeout import Silences, input_key, start_keys
+from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key, start_keys
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support, Vector
@@ -43,13 +43,13 @@ BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
 INPUT_LOST = 256
 """So many later inputs have come, and so many that their publisher keeps no more of them: this one does not come."""
-MOST_STEPS = 4096
+MAX_STEPS = 4096
 """Steps that are remembered while something is waited for, or twice those that publishers keep where these are more."""
-MOST_AT_ONCE = 1024
+MAX_AT_ONCE = 1024
 """Steps done in one tick, the next tick goes on; more only where more than this would be left."""
-MOST_MESSAGES = 32
+MAX_MESSAGES = 32
 """So much to publish and a tick ends, the next tick goes on: nobody waits for the first until the last is done."""
-MOST_USED = 2048
+MAX_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
 WEAKNESS: tuple[Guarantee, ...] = ("declared", "learned", "none")
 
@@ -69,11 +69,11 @@ class Estimator(Node):
         """Whether the data of the current step are in the set."""
         self._steps: dict[int, Step] = {}
         self._newest_input = 0
-        self._signs = Signs(configuration.mesh.rate / SECOND)
-        self._silences = Silences(configuration, self.subscriptions(), sources)
+        self._step_arrivals = StepArrivals(configuration.mesh.rate / SECOND)
+        self._source_timeouts = SourceTimeouts(configuration, self.subscriptions(), sources)
         self._has_more = False
         """Whether the last tick has left steps that may be ready."""
-        self._most_steps = max(MOST_STEPS, 2 * configuration.cached)
+        self._most_steps = max(MAX_STEPS, 2 * configuration.cached)
         self._first_evidence: int | None = None
         self._candidate: Posterior | None = None
         self._base: Base = "prior"
@@ -94,7 +94,7 @@ class Estimator(Node):
         """Events of a time update."""
         self.unsound = ""
         """Why the set that is held must not be believed; empty where it may."""
-        self.reach = Reach(engine.model)
+        self.reach = OpenLoop(engine.model)
         """The prior carried through every input: from here one can always start again."""
         self.last_posterior: Posterior | None = None
         self.absent: set[str] = set()
@@ -137,7 +137,7 @@ class Estimator(Node):
 
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""
-        self._silences.heard(source, now)
+        self._source_timeouts.received(source, now)
         step = self._see(message.step, now)
         if step is None:
             self._counts["late"] += 1
@@ -179,12 +179,12 @@ class Estimator(Node):
         if message.status in ("ok", "predicted") and (self._candidate is None or message.step > self._candidate.step):
             self._candidate = message
 
-    def rely(self, message: Posterior | Prediction) -> None:
+    def add_dependency(self, message: Posterior | Prediction) -> None:
         """Note that a message's set went into the own one, with its epochs and its guarantee."""
-        self.epochs.rely(message)
-        self.weaken(message.guarantee)
+        self.epochs.add_dependency(message)
+        self.downgrade_guarantee(message.guarantee)
 
-    def weaken(self, guarantee: Guarantee) -> None:
+    def downgrade_guarantee(self, guarantee: Guarantee) -> None:
         """The set is from now on no better than this."""
         self.guarantee = max(self.guarantee, guarantee, key=WEAKNESS.index)
 
@@ -196,10 +196,10 @@ class Estimator(Node):
         """The record of step k, or None when it lies before all that is remembered."""
         if self.current is not None and k < self.current - self.history:
             return None
-        if self.current is not None and self._signs.is_from_the_future(k, now):
+        if self.current is not None and self._step_arrivals.is_from_the_future(k, now):
             self._counts["from the future"] += 1
             return None
-        self._signs.note(k, now)
+        self._step_arrivals.record(k, now)
         if self._first_evidence is None:
             self._first_evidence = now
         step = self._steps.setdefault(k, Step())
@@ -233,18 +233,18 @@ class Estimator(Node):
                 if self._input_is_lost(k):
                     self._start_over(k, f"the input of step {k} is lost", now)
                 break
-            messages += self._said()
+            messages += self._take_remarks()
             if step.published is not None and not self.unsound and not self._is_behind():
                 messages += self.prediction(k + 1, now)
-            self._has_more = left == 0 or (len(messages) >= MOST_MESSAGES and not self._is_done_again(k + 1))
+            self._has_more = left == 0 or (len(messages) >= MAX_MESSAGES and not self._is_done_again(k + 1))
             if self._has_more:
                 break
-        return messages + self._said()
+        return messages + self._take_remarks()
 
     def _steps_at_once(self) -> int:
         """A backlog stays bounded whatever comes: what is too much waits in the queue in front of the node."""
         assert self.current is not None
-        return max(MOST_AT_ONCE, self._signs.newest - self.current - MOST_AT_ONCE)
+        return max(MAX_AT_ONCE, self._step_arrivals.newest - self.current - MAX_AT_ONCE)
 
     def _is_done_again(self, k: int) -> bool:
         """Whether the step was published before: all that a late message changes is told in one tick."""
@@ -252,11 +252,11 @@ class Estimator(Node):
 
     def _is_ready(self, k: int, step: Step, now: int) -> bool:
         if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
-            return bool(step.closed or step.arrived or self._signs.newest > k)
+            return bool(step.closed or step.arrived or self._step_arrivals.newest > k)
         return self._is_overdue(k, now)
 
     def _is_overdue(self, k: int, now: int) -> bool:
-        sign = self._signs.of(k)
+        sign = self._step_arrivals.of(k)
         return sign is not None and now >= sign + self.deadline
 
     def wakeup(self) -> int | None:
@@ -264,13 +264,13 @@ class Estimator(Node):
             return 0
         if self.current is None:
             return None if self._first_evidence is None else self._first_evidence + START_GRACE
-        sign = self._signs.of(self.current)
+        sign = self._step_arrivals.of(self.current)
         waits = not self._combined or self.configuration.input_box is not None
         return sign + self.deadline if sign is not None and waits else None
 
     def _is_behind(self) -> bool:
         assert self.current is not None
-        return self._signs.newest - self.current > BEHIND
+        return self._step_arrivals.newest - self.current > BEHIND
 
     def _close(self, k: int, step: Step, now: int) -> list[Message]:
         """Combine the step's data and publish the result if it is new."""
@@ -286,7 +286,7 @@ class Estimator(Node):
         is_first = step.published is None
         # a base that is no message does not say its step: the first posterior since then is always published
         tells_step = self._base == "prior" or not isinstance(self._base, str)
-        may_skip = combined.status in ("ok", "predicted") and len(self._used) < MOST_USED and tells_step
+        may_skip = combined.status in ("ok", "predicted") and len(self._used) < MAX_USED and tells_step
         if self.unsound and self.last_posterior is None:
             return messages
         if is_first and self._is_behind() and may_skip:
@@ -300,7 +300,7 @@ class Estimator(Node):
         support, old = to_message(self.engine.support), step.published
         box = tuple(bound.tolist() for bound in self.published_bounds())
         told = (support, box, combined.status, self.epochs.number, self.guarantee, list(combined.missing))
-        if old is not None and told == news(old):
+        if old is not None and told == published_content(old):
             self._base, self._used = old.reference, ()
             return None
         step.revision += 1
@@ -320,7 +320,9 @@ class Estimator(Node):
             elif self.configuration.input_box is not None and self._is_overdue(k, now):
                 u = self.configuration.input_box
             else:
-                self._waiting = f"input of step {k} ({input_key(self.configuration)})" if self._signs.newest > k else ""
+                self._waiting = (
+                    f"input of step {k} ({input_key(self.configuration)})" if self._step_arrivals.newest > k else ""
+                )
                 return False
         self._waiting = ""
         if step.input is not None:
@@ -330,7 +332,7 @@ class Estimator(Node):
             return False
         self.current, self._combined = k + 1, False
         self._steps.pop(k - self.remembered, None)  # one step forward, one is forgotten: never a search of the backlog
-        self._signs.forget_before(k + 1 - self.history)
+        self._step_arrivals.forget_before(k + 1 - self.history)
         return True
 
     def _predict_set(self, k: int, u: Vector | Orthotope | None, now: int) -> bool:
@@ -356,7 +358,7 @@ class Estimator(Node):
             return reach, "reach"
         return None if domain is None else (domain, "domain")
 
-    def _said(self) -> list[Message]:
+    def _take_remarks(self) -> list[Message]:
         said, self._remarks = self._remarks, []
         return said
 
@@ -421,7 +423,7 @@ class Estimator(Node):
         except InconsistentData:  # it is empty: whoever sent it was wrong
             self._candidate = None
             return False
-        self.rely(candidate)
+        self.add_dependency(candidate)
         return True
 
     def _start_from_prior(self, first: int) -> bool:
@@ -466,8 +468,8 @@ class Estimator(Node):
         for step in self._steps.values():
             step.before = None
 
-    def rehearse(self) -> None:
-        rehearse(self.engine, self.configuration.input_box)
+    def warm_up(self) -> None:
+        warm_up(self.engine, self.configuration.input_box)
 
     # -- what is said of the node
 
@@ -481,16 +483,16 @@ class Estimator(Node):
         """As of every node, how far it is behind, and which sources have fallen silent."""
         found = super().complaints(now)
         if self.current is not None and self._is_behind():
-            late, unpublished = self._signs.newest - self.current, self._counts["behind"]
+            late, unpublished = self._step_arrivals.newest - self.current, self._counts["behind"]
             text = f"behind by {late} steps; {unpublished:g} steps so far were done without being published"
             found.append(Complaint("WARN", text))
         last = self.configuration.mesh.steps
-        has_ended = last is not None and self._signs.newest >= last  # nobody has anything to say any more
+        has_ended = last is not None and self._step_arrivals.newest >= last  # nobody has anything to say any more
         is_early = self._first_evidence is None
-        return found + ([] if has_ended or is_early else self._silences.complaints(now))
+        return found + ([] if has_ended or is_early else self._source_timeouts.complaints(now))
 
     def counters(self) -> dict[str, float]:
-        return self._counts | {"epoch": self.epochs.number, "newest": self._signs.newest}
+        return self._counts | {"epoch": self.epochs.number, "newest": self._step_arrivals.newest}
 
     def noise_bounds(self) -> Bounds:
         """rho and r in force."""

@@ -13,9 +13,9 @@ from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
 from lsu_mesh.mesh.estimation.inconsistency import Dropped, update_without_contradicting_strips, widen
 from lsu_mesh.mesh.estimation.message_fields import described, finite_or_none, foretold
-from lsu_mesh.mesh.estimation.restart import Start, Starts
+from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
 from lsu_mesh.mesh.estimation.step_record import Combined, Status, Step
-from lsu_mesh.mesh.estimation.transfer import OLDEST_BOX, Transfer
+from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, Transfer
 from lsu_mesh.mesh.messages import (
     Bounds,
     Fused,
@@ -71,7 +71,7 @@ class FilterNode(Estimator):
             start = self._rows[sensor].stop
         self._inconsistent: set[int] = set()
         """Steps in a row, up to the current one, whose data contradicted the set."""
-        self._starts = Starts(self.epochs)
+        self._restart_search = RestartSearch(self.epochs)
         self._is_tested = True
         """Whether data of a later step have agreed with the set of the mesh that the node started from."""
         self._started_at = 0
@@ -93,7 +93,7 @@ class FilterNode(Estimator):
     @property
     def remembered(self) -> int:
         """A step that is done again may carry a fused box on that was old already when the step was first done."""
-        return self.history + OLDEST_BOX
+        return self.history + MAX_BOX_AGE
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return subscriptions(self.configuration, self.role, self.name)
@@ -106,8 +106,8 @@ class FilterNode(Estimator):
         if isinstance(message, Suggestion):
             self._receive_bounds(message)
         elif isinstance(message, Prediction):
-            self.epochs.note(message)
-            self._transfer.note(message)
+            self.epochs.record(message)
+            self._transfer.record(message)
         elif isinstance(message, Posterior):
             self._receive_set(message)
         return []
@@ -117,11 +117,11 @@ class FilterNode(Estimator):
             self._announced = message
 
     def _receive_set(self, message: Posterior) -> None:
-        self.epochs.note(message)
+        self.epochs.record(message)
         if isinstance(message, Fused):
             if message.name in self.settings.transfer_from:
-                self._transfer.note(message)
-            self._starts.note(message)
+                self._transfer.record(message)
+            self._restart_search.record(message)
         if self.current is None:
             self.take_candidate(message)
 
@@ -142,16 +142,16 @@ class FilterNode(Estimator):
         adopted = self._adopt(k, now)
         y, used, origin = self._stack(step)
         missing = [name for name in self.sources if name not in step.arrived]
-        messages = [*adopted, *self._mend(k, y, now)]
+        messages = [*adopted, *self._repair(k, y, now)]
         if self.unsound:
             return Combined("inconsistent", [], missing, origin, self.unsound), messages
         before = self.engine.snapshot()
         brought, told = self._bring_transfers(k, step, now)
         updated = self._update(k, y, before, brought, now)
         for message in updated.brought.used:
-            self.rely(message)
+            self.add_dependency(message)
             if self._transfer.way == "data-predictor":
-                self.weaken("none")
+                self.downgrade_guarantee("none")
         transferred = [message.reference for message in updated.brought.used]
         gain = updated.brought.gain
         combined = Combined(updated.status, [*transferred, *used], missing, origin, updated.cause, gain)
@@ -166,7 +166,7 @@ class FilterNode(Estimator):
         self.engine = make_engine(self.settings, adopted_model(self.configuration, self.settings, message), domain)
         self.best_guarantee = max(self.best_guarantee, "learned", key=WEAKNESS.index)
         self.reach.lose()
-        self._starts.forget()
+        self._restart_search.forget()
         self._inconsistent.clear()
         self.abandon_epoch("")
         self.start_from("domain", [message.reference])
@@ -197,7 +197,7 @@ class FilterNode(Estimator):
         if step.transfers is None:
             has_inputs = self.engine.model.input_count > 0
             step.transfers = self._transfer.available(k, inputs, self.epochs, needs_inputs=has_inputs)
-            self._transfer.forget_before(k - OLDEST_BOX)
+            self._transfer.forget_before(k - MAX_BOX_AGE)
         used: list[Prediction | Fused] = []
         gain = 0.0
         messages: list[Message] = []
@@ -249,7 +249,7 @@ class FilterNode(Estimator):
         if self.settings.on_contradiction == "widen":
             self._widened = widen(self.engine, y)
             if self._widened is not None:
-                self.weaken("learned")
+                self.downgrade_guarantee("learned")
                 cause = f"{error}; r widened by {self._widened:.6g}"
                 return Updated("ok", brought, cause, [self._widened_event(k, error, now)])
         epoch = self.epochs.number
@@ -321,7 +321,7 @@ class FilterNode(Estimator):
             self.engine.update(y)
         return [event]
 
-    def _mend(self, k: int, y: Vector, now: int) -> list[Message]:
+    def _repair(self, k: int, y: Vector, now: int) -> list[Message]:
         """Leave an epoch that a source has abandoned; where there was nothing sound to start from, look again."""
         source = self.epochs.abandoned
         if source is not None:
@@ -348,11 +348,11 @@ class FilterNode(Estimator):
         self.engine.restore(start.set)
         self.start_from(start.base, start.used)
         if start.message is not None:
-            self.rely(start.message)
+            self.add_dependency(start.message)
 
     def _start_again(self, k: int, y: Vector, *, abandons: bool) -> Start | None:
         """A set of step k, before its data, that is sound and meets them; ``None`` where there is none."""
-        return self._starts.find(self.engine, k, y, self.reach.box, self.inputs(), abandons=abandons)
+        return self._restart_search.find(self.engine, k, y, self.reach.box, self.inputs(), abandons=abandons)
 
     def _start_from_candidate(self) -> bool:
         if not super()._start_from_candidate():

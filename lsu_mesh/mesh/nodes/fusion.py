@@ -23,7 +23,7 @@ from lsu_mesh.mesh.nodes.node import SECOND, Complaint
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.support import Support, Vector
 
-MOST_FAMILIES = 64
+MAX_FAMILIES = 64
 """So many families of contradicting sources are tried, the largest first, to find out whom to leave out."""
 FAR_BEHIND_S, FAR_BEHIND = 2.0, 256
 """So far behind, in time at the mesh's rate and in steps, and a fusion goes on where its sources are."""
@@ -76,7 +76,7 @@ class FusionNode(Estimator):
         """Bounds of the set met with those of every accepted source."""
         self._rejected: list[Rejection] = []
         self._quarantine = Quarantine(self.sources, self.settings.quarantine_after, self.settings.max_lag)
-        self._told: set[tuple[int, str]] = set()
+        self._reported: set[tuple[int, str]] = set()
         """Steps and sources whose contradiction was told; a step that is done again does not tell it again."""
         self._counts |= {"silent steps": 0, "skipped": 0}
         self._far_behind = max(FAR_BEHIND, int(FAR_BEHIND_S * configuration.mesh.rate))
@@ -103,7 +103,7 @@ class FusionNode(Estimator):
 
     def _receive_posterior(self, message: Posterior, now: int) -> None:
         name = message.name
-        self.epochs.note(message)
+        self.epochs.record(message)
         known = self.last.get(name)
         if known is not None and self.epochs.is_abandoned(known):
             del self.last[name]
@@ -122,9 +122,9 @@ class FusionNode(Estimator):
 
     def _skip_ahead(self, now: int) -> list[Message]:
         """Far behind, join the sources where they are, like a fusion that starts late; what they know is enough."""
-        if self.current is None or self._signs.newest - self.current <= self._far_behind:
+        if self.current is None or self._step_arrivals.newest - self.current <= self._far_behind:
             return []
-        first = self._signs.newest - self.history
+        first = self._step_arrivals.newest - self.history
         if not any(self._is_start(k) for k in self._steps if k >= first):
             return []
         skipped, k = first - self.current, self.current
@@ -135,15 +135,15 @@ class FusionNode(Estimator):
 
     def _sense_silence(self, now: int) -> None:
         """When nothing at all has come for a while, steps go on by the clock; the set then grows, honestly."""
-        if self.current is None or self._signs.heard_at is None or self.waiting_for():
+        if self.current is None or self._step_arrivals.heard_at is None or self.waiting_for():
             return
         period = SECOND / self.configuration.mesh.rate
         silence = max(SECOND, int(SILENT_STEPS * period)) + self.deadline
         last = self.configuration.mesh.steps
-        while now - self._signs.heard_at > silence and (last is None or self._signs.newest < last):
-            heard_at = self._signs.heard_at + int(period)
-            self._see(self._signs.newest + 1, now)
-            self._signs.heard_at = heard_at
+        while now - self._step_arrivals.heard_at > silence and (last is None or self._step_arrivals.newest < last):
+            heard_at = self._step_arrivals.heard_at + int(period)
+            self._see(self._step_arrivals.newest + 1, now)
+            self._step_arrivals.heard_at = heard_at
             self._counts["silent steps"] += 1
 
     # -- fusion of one step
@@ -164,8 +164,8 @@ class FusionNode(Estimator):
             outcome = Outcome("inconsistent", [], self.unsound)
         self.engine.resume(self.engine.support, *self._met)  # what is published is all that the next step depends on
         agreeing = sources if outcome.status != "inconsistent" else []
-        messages = [*abandoned, *outcome.messages, *self._note_rejected(k, agreeing, now)]
-        self._rely_on(outcome.used)
+        messages = [*abandoned, *outcome.messages, *self._record_rejected(k, agreeing, now)]
+        self._add_dependencies(outcome.used)
         origin = min((source.message.origin_ns for source in outcome.used), default=None)
         used = [source.message.reference for source in outcome.used]
         return Combined(outcome.status, used, missing, origin, outcome.cause), messages
@@ -174,14 +174,14 @@ class FusionNode(Estimator):
         """Far behind, a step is only predicted through: nobody is told of it, and later sources know what it knew."""
         return self._is_behind() and not self.unsound and self.epochs.abandoned is None
 
-    def _rely_on(self, used: Sequence[Source]) -> None:
+    def _add_dependencies(self, used: Sequence[Source]) -> None:
         """No single source carries a relaxed set: of those that are learned, or abandoned, ``faults`` may be wrong."""
         if self.settings.policy == "intersect":
             for source in used:
-                self.rely(source.message)
+                self.add_dependency(source.message)
         elif used:
             guarantees = sorted((source.message.guarantee for source in used), key=WEAKNESS.index, reverse=True)
-            self.weaken(guarantees[min(self.settings.faults, len(guarantees) - 1)])
+            self.downgrade_guarantee(guarantees[min(self.settings.faults, len(guarantees) - 1)])
 
     def _sound_sources(self, step: Step) -> list[Source]:
         sources = []
@@ -211,7 +211,7 @@ class FusionNode(Estimator):
         if self.unsound and not self._start_without_sources():
             return Outcome("inconsistent", [], f"{cause}, and {self.unsound}")
         accepted = self._largest_family(sources)
-        self.weaken("learned")
+        self.downgrade_guarantee("learned")
         messages = self._name_rejected(k, [source for source in sources if source not in accepted], now)
         return Outcome("ok" if accepted else "inconsistent", accepted, cause, messages)
 
@@ -304,7 +304,7 @@ class FusionNode(Estimator):
         """Meet the set with as many sources as have a point in common with it, the first by name of equal size."""
         before, met = self.engine.snapshot(), self._met
         families = (f for size in range(len(sources) - 1, 0, -1) for f in itertools.combinations(sources, size))
-        for family in itertools.islice(families, MOST_FAMILIES):
+        for family in itertools.islice(families, MAX_FAMILIES):
             if self._try_all(family):
                 return family
             self.engine.restore(before)
@@ -324,23 +324,23 @@ class FusionNode(Estimator):
     def _name_rejected(self, k: int, rejected: Sequence[Source], now: int) -> list[Message]:
         """Events and counts of the sources that contradict the others."""
         messages: list[Message] = []
-        self._told = {(step, name) for step, name in self._told if step >= k - self.history}
+        self._reported = {(step, name) for step, name in self._reported if step >= k - self.history}
         for name in sorted(source.name for source in rejected):
             reason = "contradicts what the other sources and the own prediction agree on"
             self._rejected.append(Rejection(source=name, reason=reason))
-            if (k, name) in self._told:
+            if (k, name) in self._reported:
                 continue
-            self._told.add((k, name))
+            self._reported.add((k, name))
             self._counts["contradictions"] += 1
             text = f"step {k}: {name} {reason}; left out"
             messages.append(self.event("WARN", "source-rejected", text, now, k, {"source": name, "step": k}))
         return messages
 
-    def _note_rejected(self, k: int, agreeing: Sequence[Source], now: int) -> list[Message]:
+    def _record_rejected(self, k: int, agreeing: Sequence[Source], now: int) -> list[Message]:
         """Events of who is quarantined, left out too often for whatever reason, and of who is let back in."""
         left_out = {rejection.source for rejection in self._rejected}
         agreed = {source.name for source in agreeing} - left_out
-        return self._quarantine.note(k, left_out, agreed, self._say_quarantine(k, now))
+        return self._quarantine.record(k, left_out, agreed, self._say_quarantine(k, now))
 
     def _say_quarantine(self, k: int, now: int) -> Say:
         def say(name: str, is_in: bool) -> Message:

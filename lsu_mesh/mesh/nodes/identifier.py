@@ -25,7 +25,7 @@ from lsu_mesh.supports.support import Vector
 
 GIVEN_UP = 8
 """A step whose measurements have not all come when so many later ones have is looked at as it is."""
-MOST_WAITING = 1024
+MAX_WAITING = 1024
 """Steps beyond the window that are kept while something is waited for."""
 ROUNDING = 1e-9
 """A factor above 1 by no more than this is one of the solver's rounding."""
@@ -60,7 +60,7 @@ class IdentifierNode(Node):
             self._newest = max(self._newest, message.step)
         elif isinstance(message, Input):
             self._u.setdefault(message.step, np.array(message.u))
-        most = 2 * (self.settings.window + self.settings.every) + MOST_WAITING
+        most = 2 * (self.settings.window + self.settings.every) + MAX_WAITING
         for kept in (self._y, self._u):
             while len(kept) > most:  # the other kind does not come
                 del kept[next(iter(kept))]
@@ -113,7 +113,7 @@ class IdentifierNode(Node):
         self._counts["factor"] = factor
         explained = factor <= 1.0 + ROUNDING
         suggestion = self._suggestion(factor, explained, first, last, now)
-        told = self._told(factor, explained, suggestion, now)
+        told = self._reported(factor, explained, suggestion, now)
         if not explained:
             self._counts["suggestions"] += 1
             self._model = self._bounded(suggestion)
@@ -143,7 +143,7 @@ class IdentifierNode(Node):
         r = [width for name in self.settings.sensors for width in suggestion.r[name]]
         return self._model.replace(rho=suggestion.rho, r=r)
 
-    def _told(self, factor: float, explained: bool, suggestion: Suggestion, now: int) -> list[Message]:
+    def _reported(self, factor: float, explained: bool, suggestion: Suggestion, now: int) -> list[Message]:
         first, last = suggestion.first, suggestion.last
         about: dict[str, str | int | float | None] = {"first": first, "last": last, "factor": factor}
         if not explained:
@@ -165,7 +165,7 @@ class IdentifierNode(Node):
     def counters(self) -> dict[str, float]:
         return self._counts
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         Y = np.zeros((3, self._model.output_count))
         data = Record(Y, np.zeros((2, self._model.input_count)))
         smallest(Structure(self._model), data, learn_choice(self.settings.learn))

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import VERSION, Event, Health, Message
@@ -77,7 +77,7 @@ class Node(ABC):
         self._waiting_since: int | None = None
         self.gauges: dict[str, float] = {"links": 0.0}
         """What the service around it measures, told with the counters: links, queue, queue_ms, dropped, step_ms."""
-        self.gate = Gate(configuration, {*(topic for topic, _ in self.subscriptions()), *self.answers})
+        self.admission = Admission(configuration, {*(topic for topic, _ in self.subscriptions()), *self.answers})
 
     @abstractmethod
     def subscriptions(self) -> Sequence[tuple[str, str]]:
@@ -92,8 +92,8 @@ class Node(ABC):
         """Do what is due by ``now``; return what to publish."""
 
     def deliver(self, address: str, payload: bytes, now: int) -> list[Message]:
-        """Gate and :meth:`receive`."""
-        message = self.gate.admit(address, payload)
+        """Admission and :meth:`receive`."""
+        message = self.admission.admit(address, payload)
         return [] if message is None else self.receive(message, now)
 
     def tick(self, now: int) -> list[Message]:
@@ -105,11 +105,11 @@ class Node(ABC):
             messages.append(self.health(now))
         return messages
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         """Do once, and forget, what a step does, so that the first real step finds all kernels loaded."""
         return
 
-    def note_links(self, count: int) -> None:
+    def record_links(self, count: int) -> None:
         """How many peers and routers the process is connected to; the next tick tells."""
         self.gauges["links"] = float(count)
         self.next_health = 0
@@ -177,7 +177,7 @@ class Node(ABC):
             role=self.role,
             level="ERROR" if "ERROR" in levels else "WARN" if levels else "OK",
             reasons=[complaint.text for complaint in complaints],
-            counters=self.gate.counters | self.counters() | self.gauges,
+            counters=self.admission.counters | self.counters() | self.gauges,
         )
 
     def complaints(self, now: int) -> list[Complaint]:
@@ -191,9 +191,9 @@ class Node(ABC):
         if waited > PATIENCE_NS:
             level = "ERROR" if waited > LONG_NS else "WARN"
             found.append(Complaint(level, f"waiting for {self.waiting_for()} for {waited / SECOND:.1f} s"))
-        refused, dropped = self.gate.refused.total(), self.gauges.get("dropped", 0.0)
+        refused, dropped = self.admission.refused.total(), self.gauges.get("dropped", 0.0)
         if self._refused.is_recent(refused, now):
-            found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {self.gate.last_refusal}"))
+            found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {self.admission.last_refusal}"))
         if self._dropped.is_recent(dropped, now):
             found.append(Complaint("WARN", f"{dropped:g} message(s) so far found the queue full and were dropped"))
         queued_s = self.gauges.get("queue_ms", 0.0) * 1e-3

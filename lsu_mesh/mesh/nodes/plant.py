@@ -12,12 +12,12 @@ from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Input, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
-from lsu_mesh.mesh.nodes.rate_limit import Pace
+from lsu_mesh.mesh.nodes.rate_limit import RateLimit
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.simulation import input_at, next_state, random_uniform
 from lsu_mesh.supports.support import Vector
 
-MOST_AT_ONCE = 64
+MAX_AT_ONCE = 64
 """Steps published in one tick at the most, so that a late plant does not flood the mesh."""
 PAST_SECONDS, LEAST_PAST = 30.0, 256
 """So much of the past, and so many steps, a plant that starts late publishes the inputs of: filters need every one."""
@@ -41,7 +41,7 @@ class PlantNode(Node):
         assert configuration.plant is not None
         self._settings = configuration.plant
         self._schedule = schedule
-        self._pace = Pace(configuration.mesh.rate, configuration.cached)
+        self._pace = RateLimit(configuration.mesh.rate, configuration.cached)
         self._model = configuration.base_model
         self._last = configuration.mesh.steps
         self._next = 1
@@ -62,7 +62,7 @@ class PlantNode(Node):
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return ()
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         next_state(self._model, self._x, np.zeros(self._model.input_count), np.zeros(self._model.rho.size))
 
     def receive(self, message: Message, now: int) -> list[Message]:
@@ -78,7 +78,7 @@ class PlantNode(Node):
             self._past = self._past_before(due)
         if self._next < self._past.stop:
             return self._catch_up(self._past, now)
-        steps = self._pace.take(min(MOST_AT_ONCE, due + 1 - self._next), now)
+        steps = self._pace.take(min(MAX_AT_ONCE, due + 1 - self._next), now)
         messages: list[Message] = []
         for k in range(self._next, self._next + steps):
             messages.append(Truth(**self.stamp("truth", k, now), x=self._x.tolist()))
@@ -87,7 +87,7 @@ class PlantNode(Node):
 
     def _past_before(self, due: int) -> range:
         """The steps before the one that is due, as far back as inputs are repeated; none for a plant in time."""
-        if due <= MOST_AT_ONCE:
+        if due <= MAX_AT_ONCE:
             return range(0)
         repeated = max(LEAST_PAST, math.ceil(PAST_SECONDS * self.configuration.mesh.rate))
         return range(max(1, due - repeated), due)
@@ -101,7 +101,7 @@ class PlantNode(Node):
             return []
         self._not_before = now + PAST_PACE_NS
         messages: list[Message] = []
-        while self._next < past.stop and len(messages) < MOST_AT_ONCE:
+        while self._next < past.stop and len(messages) < MAX_AT_ONCE:
             messages += self._drive(self._next, now, publish=True)
         return messages
 

@@ -17,7 +17,7 @@ HURRY = 5.0
 """So many times as fast as time does a late source publish then."""
 
 
-class Pace:
+class RateLimit:
     """Steps that may go out: a bucket of ``kept/3`` tokens, filled at the mesh's rate, later ``HURRY`` times as fast.
 
     Parameters

@@ -12,8 +12,8 @@ from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.config.settings import Configuration, SensorFault
 from lsu_mesh.mesh.messages import Measurement, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
-from lsu_mesh.mesh.nodes.plant import MOST_AT_ONCE
-from lsu_mesh.mesh.nodes.rate_limit import Pace
+from lsu_mesh.mesh.nodes.plant import MAX_AT_ONCE
+from lsu_mesh.mesh.nodes.rate_limit import RateLimit
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.simulation import measure, random_uniform
 from lsu_mesh.supports.support import Vector
@@ -35,7 +35,7 @@ class SimulatedSensorNode(Node):
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return subscriptions(self.configuration, self.role, self.name)
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         settings = self._settings
         measure(settings.C, settings.r, np.zeros(len(settings.C[0])), np.zeros(len(settings.r)))
 
@@ -102,7 +102,7 @@ class FileSensorNode(Node):
         if mesh.steps is not None:
             self._last = min(self._last, mesh.steps)
         self._told_collisions = False
-        self._pace = Pace(mesh.rate, configuration.cached)
+        self._pace = RateLimit(mesh.rate, configuration.cached)
         self._has_begun = False
         """Whether a step has been due."""
 
@@ -127,7 +127,7 @@ class FileSensorNode(Node):
             self._has_begun = True
             kept = self.configuration.cached
             self._next = max(self._next, due + 1 - kept)  # what came before would be too late for everybody
-        steps = self._pace.take(min(MOST_AT_ONCE, due + 1 - self._next), now)
+        steps = self._pace.take(min(MAX_AT_ONCE, due + 1 - self._next), now)
         messages += [self._measurement(k, now) for k in range(self._next, self._next + steps)]
         self._next += steps
         return messages

@@ -13,22 +13,22 @@ STRANGE_SILENCE = 2 * SECOND
 """A source that says nothing for longer, and for longer than usual, is complained of."""
 
 
-class Silence(NamedTuple):
+class SourceTimeout(NamedTuple):
     """Since when a source has said nothing, and the longest that it ever said nothing."""
 
     since: int
     longest: int = 0
 
-    def heard(self, now: int) -> Silence:
+    def received(self, now: int) -> SourceTimeout:
         """After one more message."""
-        return Silence(now, max(self.longest, now - self.since))
+        return SourceTimeout(now, max(self.longest, now - self.since))
 
     def is_strange(self, now: int) -> bool:
         """Whether it is silent for much longer than it ever was."""
         return now - self.since > max(STRANGE_SILENCE, 4 * self.longest)
 
 
-class Silences:
+class SourceTimeouts:
     """The silences of all sources; one that was never heard is silent since the first of them was."""
 
     def __init__(
@@ -36,19 +36,19 @@ class Silences:
     ) -> None:
         mesh = configuration.mesh.name
         self._keys = {name: key(mesh, topic, name) for topic, name in subscriptions if name in sources}
-        self._known: dict[str, Silence] = {}
+        self._known: dict[str, SourceTimeout] = {}
         self._first: int | None = None
 
-    def heard(self, source: str, now: int) -> None:
+    def received(self, source: str, now: int) -> None:
         """A source has said something."""
         self._first = now if self._first is None else self._first
-        self._known[source] = self._known.get(source, Silence(now)).heard(now)
+        self._known[source] = self._known.get(source, SourceTimeout(now)).received(now)
 
     def complaints(self, now: int) -> list[Complaint]:
         """One per source whose silence is strange."""
         if self._first is None:
             return []
-        silent = [(address, self._known.get(name, Silence(self._first))) for name, address in self._keys.items()]
+        silent = [(address, self._known.get(name, SourceTimeout(self._first))) for name, address in self._keys.items()]
         return [
             Complaint("WARN", f"nothing from {address} for {(now - silence.since) / SECOND:.0f} s")
             for address, silence in silent

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lsu_mesh.mesh.messages import Message, decode
 
-MOST = 4096
+MAX_KNOWN = 4096
 
 
 class SharedDecoder:
@@ -18,7 +18,7 @@ class SharedDecoder:
         message = self._known.get((topic, payload))
         if message is None:
             message = decode(topic, payload)
-            if len(self._known) >= MOST:
+            if len(self._known) >= MAX_KNOWN:
                 self._known.clear()
             self._known[topic, payload] = message
         return message

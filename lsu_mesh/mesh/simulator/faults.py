@@ -12,10 +12,10 @@ MESSAGE_FAULTS = ("drop", "delay", "duplicate", "reorder", "corrupt")
 FAULTS = (*MESSAGE_FAULTS, "partition", "freeze", "kill", "skew")
 HIGHEST_RATE = {"drop": 0.15, "delay": 0.1, "duplicate": 0.1, "reorder": 0.2, "corrupt": 0.04}
 """Share of a link's messages that a fault hits at the most."""
-MOST_OUTAGES = {"partition": 2, "freeze": 3, "kill": 4}
-SHORTEST_OUTAGE_NS, LONGEST_OUTAGE_NS = SECOND // 20, 3 * SECOND
-LARGEST_SKEW_NS = 2 * SECOND
-LARGEST_DRIFT = 2e-4
+MAX_OUTAGES = {"partition": 2, "freeze": 3, "kill": 4}
+SHORTEST_OUTAGE_NS, MAX_OUTAGE_NS = SECOND // 20, 3 * SECOND
+MAX_SKEW_NS = 2 * SECOND
+MAX_DRIFT = 2e-4
 """Seconds that a bad clock gains or loses in a second."""
 MEMBERSHIP = 0.75
 """Chance that a fault that is allowed takes part in a run: fewer kinds at once reach other states than all of them."""
@@ -83,7 +83,7 @@ def draw_plan(
     skews = {}
     if "skew" in chosen:
         skews = {
-            name: Skew(rng.randint(-LARGEST_SKEW_NS, LARGEST_SKEW_NS), rng.uniform(-LARGEST_DRIFT, LARGEST_DRIFT))
+            name: Skew(rng.randint(-MAX_SKEW_NS, MAX_SKEW_NS), rng.uniform(-MAX_DRIFT, MAX_DRIFT))
             for role, name in peers
             if role != "plant" and rng.random() < 0.5
         }
@@ -92,9 +92,9 @@ def draw_plan(
 
 def _draw_outages(rng: random.Random, kind: str, names: Sequence[str], begin: int, end: int) -> tuple[Outage, ...]:
     outages = []
-    for _ in range(rng.randint(1, MOST_OUTAGES[kind])):
+    for _ in range(rng.randint(1, MAX_OUTAGES[kind])):
         size = rng.randint(1, len(names) - 1) if kind == "partition" else 1
-        length = round(SHORTEST_OUTAGE_NS * (LONGEST_OUTAGE_NS / SHORTEST_OUTAGE_NS) ** rng.random())
+        length = round(SHORTEST_OUTAGE_NS * (MAX_OUTAGE_NS / SHORTEST_OUTAGE_NS) ** rng.random())
         first = rng.randint(begin, max(begin, end - length))
         outages.append(Outage(frozenset(rng.sample(names, size)), first, min(end, first + length)))
     return tuple(outages)

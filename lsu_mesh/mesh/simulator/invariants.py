@@ -49,7 +49,7 @@ class Life:
     """Next revision by step."""
 
 
-class Witness:
+class Invariants:
     """Checks what can be checked at once; ``X`` (T, n) holds the true states of steps 1 … T."""
 
     def __init__(self, configuration: Configuration, X: NDArray[np.float64]) -> None:
@@ -102,7 +102,7 @@ class Witness:
             self.health[node.name] = message
             if isinstance(node, RecorderSink):
                 self._check_flushed(node, message)
-        self._provenance.note(message)
+        self._provenance.record(message)
 
     def ran(self, node: Node) -> None:
         """A process has done all that it could with what it had."""

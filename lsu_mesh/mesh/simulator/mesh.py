@@ -19,11 +19,11 @@ from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
 from lsu_mesh.mesh.simulator.decoding import SharedDecoder
 from lsu_mesh.mesh.simulator.faults import FaultPlan, Skew
-from lsu_mesh.mesh.simulator.invariants import Witness
+from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
 from lsu_mesh.mesh.simulator.transport import MILLISECOND, Links, Port, Transport
 
-LONGEST_WAIT_NS = SECOND // 10
+MAX_WAIT_NS = SECOND // 10
 START_NS = 1_000 * SECOND
 """True time at which step 1 is due; far from zero, so that no skewed clock is negative."""
 LAST_ANSWERED = 0.7
@@ -90,7 +90,7 @@ class Process:
             self.next_run = at
             self._mesh.agenda.add(at, self._run, phase=1)
 
-    def note_presence(self, name: str, is_there: bool, at: int) -> None:
+    def record_presence(self, name: str, is_there: bool, at: int) -> None:
         """Liveliness of another peer."""
         if self.port.is_open:
             self._presence.append((name, is_there))
@@ -116,12 +116,12 @@ class Process:
         self._publish(self.node.tick(now), at)
         self._mesh.witness.ran(self.node)
         wakeup = self.node.wakeup()
-        wait = LONGEST_WAIT_NS if wakeup is None else min(LONGEST_WAIT_NS, max(MILLISECOND, wakeup - now))
+        wait = MAX_WAIT_NS if wakeup is None else min(MAX_WAIT_NS, max(MILLISECOND, wakeup - now))
         self.wake(at + wait)
 
     def _take(self, arrival: Arrival) -> list[Message]:
         """What ``Node.deliver`` does, with the witness between gate and node."""
-        message = self.node.gate.admit(arrival.key, arrival.payload)
+        message = self.node.admission.admit(arrival.key, arrival.payload)
         if message is None:
             return []
         self._mesh.witness.admitted(self.node, message)
@@ -143,7 +143,7 @@ class Process:
 class SimulatedMesh:
     """All peers of a configuration under one plan of faults."""
 
-    def __init__(self, configuration: Configuration, plan: FaultPlan, rng: random.Random, witness: Witness) -> None:
+    def __init__(self, configuration: Configuration, plan: FaultPlan, rng: random.Random, witness: Invariants) -> None:
         self.configuration = configuration
         self.witness = witness
         self.agenda = Agenda(rng)
@@ -188,7 +188,7 @@ class SimulatedMesh:
             return
         self._boots += 1
         node = self._made(role, name, f"{self._boots:08x}{self._rng.getrandbits(32):08x}")
-        node.gate.decoder = self._decoder.decode
+        node.admission.decoder = self._decoder.decode
         process = Process(self, node, self._plan.skews.get(name, Skew()), self.configuration.cached)
         self.witness.began(node)
         self._greet(process, at)
@@ -244,7 +244,7 @@ class SimulatedMesh:
     def _presence_of(here: Process, there: Process, is_there: bool) -> Callable[[int], None]:
         def tell(at: int) -> None:
             if there.port.is_open or not is_there:
-                here.note_presence(there.port.name, is_there, at)
+                here.record_presence(there.port.name, is_there, at)
 
         return tell
 
@@ -262,7 +262,7 @@ class SimulatedMesh:
 
         def tell(at: int) -> None:
             if name not in self.processes:
-                here.note_presence(name, False, at)
+                here.record_presence(name, False, at)
 
         return tell
 

@@ -22,7 +22,7 @@ class Provenance:
         """The role of whoever publishes a topic under a name."""
         return ROLE_OF_TOPIC.get(topic) or self._roles[name]
 
-    def note(self, message: Message) -> None:
+    def record(self, message: Message) -> None:
         """A message was published."""
         if message.topic not in ("health", "event", "truth"):
             self._steps[message.reference] = message.step

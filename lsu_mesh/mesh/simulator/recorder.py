@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.ledger import Ledger
 from lsu_mesh.mesh.messages import TYPES, Message, Reference
@@ -20,7 +20,7 @@ class RecorderSink(Node):
 
     def __init__(self, configuration: Configuration, name: str, boot: str, stored: list[Reference]) -> None:
         super().__init__(configuration, name, boot)
-        self.gate = Gate(configuration, TYPES)
+        self.admission = Admission(configuration, TYPES)
         self.ledger = Ledger()
         self.stored = stored
         self._waiting: list[Reference] = []
@@ -32,7 +32,7 @@ class RecorderSink(Node):
 
     def receive(self, message: Message, now: int) -> list[Message]:
         self._waiting.append(message.reference)
-        self.ledger.note(self.key_of(message), message.boot, message.seq)
+        self.ledger.record(self.key_of(message), message.boot, message.seq)
         return []
 
     def key_of(self, message: Message) -> str:

@@ -16,7 +16,7 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Posterior
 from lsu_mesh.mesh.simulator.broken import InvariantBroken
 from lsu_mesh.mesh.simulator.faults import FaultPlan, draw_plan
-from lsu_mesh.mesh.simulator.invariants import Witness
+from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.mesh import SimulatedMesh
 from lsu_mesh.mesh.simulator.variants import Variant, configured, draw_variant
 from lsu_mesh.simulation import input_at, next_state, random_uniform
@@ -56,7 +56,7 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
     variant = draw_variant(rng, base)
     trajectory = rng.randrange(TRAJECTORIES)
     configuration = configured(file, steps, trajectory, variant)
-    witness = Witness(configuration, true_states(configuration, steps + AFTERMATH))
+    witness = Invariants(configuration, true_states(configuration, steps + AFTERMATH))
     last_faulty = max(steps // 2, steps - RECOVERY_STEPS - JUDGED_STEPS)
     begin, end = (SimulatedMesh.start_time(configuration, step) for step in (0, last_faulty))
     plan = draw_plan(rng, faults, configuration.peers(), begin, end)
@@ -82,7 +82,7 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
 def fault_free_widths(file: Path, steps: int, trajectory: int, variant: Variant) -> dict[str, float]:
     """Mean width of each estimator's judged sets when nothing goes wrong."""
     configuration = configured(file, steps, trajectory, variant)
-    witness = Witness(configuration, true_states(configuration, steps + AFTERMATH))
+    witness = Invariants(configuration, true_states(configuration, steps + AFTERMATH))
     SimulatedMesh(configuration, FaultPlan(0), random.Random(0), witness).run(steps + AFTERMATH)
     return {name: judged_width(name, newest, steps) for name, newest in witness.newest.items()}
 
@@ -110,7 +110,7 @@ def judged_width(name: str, newest: dict[int, Posterior], steps: int) -> float:
     return float(np.mean(widths))
 
 
-def _check_end(configuration: Configuration, witness: Witness, widths: dict[str, float], widest: float) -> None:
+def _check_end(configuration: Configuration, witness: Invariants, widths: dict[str, float], widest: float) -> None:
     """Healthy, complete, and as narrow as without faults."""
     for _, name in configuration.peers():
         health = witness.health.get(name)

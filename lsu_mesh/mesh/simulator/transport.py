@@ -22,8 +22,8 @@ MILLISECOND = SECOND // 1000
 HEARTBEAT_NS = 100 * MILLISECOND
 LEASE_NS = 2 * SECOND
 RECONNECT_NS = SECOND
-LONGEST_DELAY_NS = 2 * SECOND
-LONGEST_COPY_NS = 5 * SECOND
+MAX_DELAY_NS = 2 * SECOND
+MAX_COPY_NS = 5 * SECOND
 """So much later a copy of an old message may come."""
 
 Schedule = Callable[[int, Callable[[int], None]], None]
@@ -143,10 +143,10 @@ class Transport:
                 self._miss(sample, sender, receiver, now)
                 return
             if kind == "duplicate":
-                later = now + delay + self._log_uniform(LONGEST_COPY_NS)
+                later = now + delay + self._log_uniform(MAX_COPY_NS)
                 self._arrive_at(later, sample.key, sample.payload, receiver)
             elif kind == "delay":
-                delay += self._log_uniform(LONGEST_DELAY_NS)
+                delay += self._log_uniform(MAX_DELAY_NS)
             else:  # reorder
                 delay += self._rng.randint(1, 80) * MILLISECOND
         self._schedule(now + delay, lambda at: self._come(sample, receiver, at))

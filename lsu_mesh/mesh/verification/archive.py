@@ -40,9 +40,9 @@ class Archive:
         for message in messages:
             if message.reference not in self._messages:
                 self._messages[message.reference] = message
-                self._note(message)
+                self._record_message(message)
 
-    def _note(self, message: Message) -> None:
+    def _record_message(self, message: Message) -> None:
         if isinstance(message, Input):
             self.inputs.setdefault(message.step, message)
         elif isinstance(message, Truth):

@@ -52,7 +52,7 @@ class Containment:
         """For the sets of a recording."""
         return cls(configuration, archive)
 
-    def look(self, message: Posterior | Prediction) -> None:
+    def check(self, message: Posterior | Prediction) -> None:
         """Check one set, after all that it was made from."""
         truth = self.archive.truth.get(message.step)
         reason = self._reason(message)

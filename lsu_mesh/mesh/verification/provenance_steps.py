@@ -18,7 +18,7 @@ class Brought:
     input: Input | None = None
 
 
-def course(posterior: Posterior, first: int, archive: Archive) -> dict[int, Brought]:
+def provenance_steps(posterior: Posterior, first: int, archive: Archive) -> dict[int, Brought]:
     """The steps ``first`` … ``posterior.step`` with what each was given.
 
     Raises :class:`Unverifiable` where a message is not in the archive, :class:`DoesNotFit` where one cannot have been

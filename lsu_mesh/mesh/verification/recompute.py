@@ -17,18 +17,18 @@ from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
 from lsu_mesh.mesh.estimation.inconsistency import update_without_contradicting_strips, widen
 from lsu_mesh.mesh.estimation.message_fields import described, described_box, finite_or_none, foretold
-from lsu_mesh.mesh.estimation.open_loop import Reach
+from lsu_mesh.mesh.estimation.open_loop import OpenLoop
 from lsu_mesh.mesh.estimation.transfer import Transfer
 from lsu_mesh.mesh.messages import Bounds, Measurement, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
-from lsu_mesh.mesh.verification.provenance_steps import Brought, course
+from lsu_mesh.mesh.verification.provenance_steps import Brought, provenance_steps
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Vector
 
 Fields = Mapping[str, Any]
 """Fields of a message and their values."""
-MOST_KEPT = 8192
+MAX_KEPT = 8192
 """So many states are remembered of a filter whose messages do not tell all that it holds."""
 
 
@@ -48,7 +48,7 @@ class Recomputation(ABC):
         contradicts itself.
         """
         first = self._hold_base(recorded)
-        steps = course(recorded, first, self._archive)
+        steps = provenance_steps(recorded, first, self._archive)
         fields: Fields = {}
         try:
             for k, brought in steps.items():
@@ -102,7 +102,7 @@ class Recomputation(ABC):
         """The prior carried to step k."""
         if self._engine.model.input_count and self._configuration.input_box is not None:
             raise Unverifiable(f"which inputs before step {k} were known in time is not told")
-        reach = Reach(self._engine.model)
+        reach = OpenLoop(self._engine.model)
         reach.begin(self._configuration.prior)
         for j in range(1, k):
             reach.predict(self._input(j))
@@ -122,7 +122,7 @@ class Recomputation(ABC):
 
     def _keep(self, reference: Reference) -> None:
         self._kept[reference] = self._engine.snapshot()
-        if len(self._kept) > MOST_KEPT:
+        if len(self._kept) > MAX_KEPT:
             self._kept.popitem(last=False)
 
     # -- time update

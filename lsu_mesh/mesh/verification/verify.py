@@ -70,7 +70,7 @@ def verify(configuration: Configuration, messages: Iterable[Message]) -> Verific
     recomputations: dict[str, Recomputation] = {}
     found = Verification(containment=Containment.of(configuration, archive))
     for recorded in archive.sets():
-        found.containment.look(recorded)
+        found.containment.check(recorded)
         recomputation = recomputations.get(recorded.src)
         if recomputation is None:
             recomputation = recomputations[recorded.src] = _recomputation(configuration, archive, recorded)

@@ -23,10 +23,10 @@ from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
 from lsu_mesh_services.network.security import missing_files
 
 Level = Literal["ok", "warn", "fail"]
-OLDEST_PYTHON = (3, 11)
+MIN_PYTHON = (3, 11)
 NEEDED = ("numpy", "scipy", "numba", "msgspec", "eclipse-zenoh", "rerun-sdk", "rich", "pyarrow", "cryptography")
 CONSTRAINTS = Path(__file__).resolve().parents[2] / "constraints.txt"
-ENOUGH_FILES, FEWEST_FILES = 1024, 256
+ENOUGH_FILES, MIN_FILES = 1024, 256
 ENOUGH_DISK, LEAST_DISK = 2**30, 100 * 2**20
 PEER_MEMORY = 200 * 2**20
 """A peer with its kernels; a recorder needs twice that."""
@@ -87,7 +87,7 @@ def checks(configuration: Configuration) -> Iterator[Check]:
 def python_version(version: tuple[int, ...]) -> Check:
     """At least the oldest that is tested."""
     words = ".".join(str(part) for part in version)
-    if version[:2] >= OLDEST_PYTHON:
+    if version[:2] >= MIN_PYTHON:
         return Check("Python", "ok", words)
     return Check("Python", "fail", words, "lsu-mesh needs 3.11 or newer: make setup PYTHON=python3.12")
 
@@ -162,7 +162,7 @@ def open_files(soft: int, hard: int) -> Check:
     if soft == resource.RLIM_INFINITY or soft >= ENOUGH_FILES:
         return Check("open files", "ok", "no limit" if soft == resource.RLIM_INFINITY else f"{soft} a process")
     remedy = f"ulimit -n {ENOUGH_FILES}"
-    return Check("open files", "warn" if soft >= FEWEST_FILES else "fail", f"only {soft} a process", remedy)
+    return Check("open files", "warn" if soft >= MIN_FILES else "fail", f"only {soft} a process", remedy)
 
 
 def clock() -> Check:

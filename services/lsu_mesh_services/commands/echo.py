@@ -16,7 +16,7 @@ from lsu_mesh_services.network.addresses import read_address
 
 DIGITS = 7
 """Of numbers for people; ``--json`` gives all."""
-MOST_ITEMS = 8
+MAX_ITEMS = 8
 """Longer lists are cut for people."""
 
 
@@ -33,10 +33,10 @@ def _echo(configuration: Configuration, options: argparse.Namespace) -> int:
     printed, refused = 0, 0
     with watching(configuration, options) as watch:
         watch.listen(addresses)
-        for heard in watch.heard(options.timeout):
-            if watch.gate.refused.total() > refused:
-                refused = watch.gate.refused.total()
-                print(f"refused: {watch.gate.last_refusal}", file=sys.stderr)
+        for heard in watch.received(options.timeout):
+            if watch.admission.refused.total() > refused:
+                refused = watch.admission.refused.total()
+                print(f"refused: {watch.admission.last_refusal}", file=sys.stderr)
             if heard is None or heard.message is None:
                 continue
             try:
@@ -95,6 +95,6 @@ def shown(value: object) -> str:
     if isinstance(value, dict):
         return "{" + ", ".join(f"{name}: {shown(one)}" for name, one in value.items()) + "}"
     if isinstance(value, list | tuple):
-        rest = f", … {len(value)} in all" if len(value) > MOST_ITEMS else ""
-        return "[" + ", ".join(shown(one) for one in value[:MOST_ITEMS]) + rest + "]"
+        rest = f", … {len(value)} in all" if len(value) > MAX_ITEMS else ""
+        return "[" + ", ".join(shown(one) for one in value[:MAX_ITEMS]) + rest + "]"
     return "nil" if value is None else str(value)

@@ -40,7 +40,7 @@ def _present(configuration: Configuration, options: argparse.Namespace) -> set[s
     there: set[str] = set()
     with watching(configuration, options) as watch:
         watch.listen([])
-        for heard in watch.heard(PRESENCE_S):
+        for heard in watch.received(PRESENCE_S):
             if heard is not None and heard.message is None:
                 (there.add if heard.is_there else there.discard)(heard.name)
     return there

@@ -7,7 +7,7 @@ import json
 import sys
 from collections.abc import Sequence
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import PREFIX, key, parse
 from lsu_mesh.mesh.messages import Health
@@ -38,7 +38,7 @@ def _tell(configuration: Configuration, options: argparse.Namespace) -> int:
 
 def _listen(configuration: Configuration, options: argparse.Namespace) -> list[PeerHealth]:
     """Heartbeats and liveliness of so many seconds, judged at their end."""
-    clock, gate, mesh = Clock(), Gate(configuration, ("health",)), configuration.mesh.name
+    clock, gate, mesh = Clock(), Admission(configuration, ("health",)), configuration.mesh.name
     observer = HealthObserver(configuration, clock.now())
     with Bus(session_settings(configuration, options), clock) as bus:
         bus.subscribe(f"{PREFIX}/{mesh}/health/*")
@@ -47,20 +47,20 @@ def _listen(configuration: Configuration, options: argparse.Namespace) -> list[P
         while (left := end - clock.now()) > 0:
             arrival = bus.next(left / SECOND)
             if arrival is not None:
-                note(observer, gate, arrival)
+                record(observer, gate, arrival)
         return observer.peers(clock.now())
 
 
-def note(observer: HealthObserver, gate: Gate, arrival: Arrival) -> None:
+def record(observer: HealthObserver, gate: Admission, arrival: Arrival) -> None:
     """Tell the observer what has come."""
     if arrival.what != "sample":
         address = parse(arrival.key)
         if address is not None:
-            observer.note_presence(address.name, arrival.what == "alive")
+            observer.record_presence(address.name, arrival.what == "alive")
         return
     message = gate.admit(arrival.key, arrival.payload)
     if isinstance(message, Health):
-        observer.note(message, arrival.arrival_ns)
+        observer.record(message, arrival.arrival_ns)
 
 
 def print_json(peers: Sequence[PeerHealth]) -> None:

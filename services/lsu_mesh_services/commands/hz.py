@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh_services.exit_codes import NOT_MET, OK
-from lsu_mesh_services.monitoring.stream_statistics import Beat
+from lsu_mesh_services.monitoring.stream_statistics import StreamStatistics
 from lsu_mesh_services.monitoring.subscriber import run_tool, watching
 from lsu_mesh_services.network.addresses import read_address
 
@@ -21,18 +21,18 @@ def main(options: argparse.Namespace) -> int:
 
 def _measure(configuration: Configuration, options: argparse.Namespace) -> int:
     addresses = read_address(configuration, options.address)
-    beats = {f"{topic}/{name}": Beat() for topic, name in addresses}
+    beats = {f"{topic}/{name}": StreamStatistics() for topic, name in addresses}
     with watching(configuration, options) as watch:
         watch.listen(addresses)
         told = watch.clock.now()
-        for heard in watch.heard(options.seconds):
+        for heard in watch.received(options.seconds):
             if heard is not None and heard.message is not None:
                 beat = beats[f"{heard.topic}/{heard.name}"]
-                beat.note(heard.arrival_ns, heard.message.sent_ns, heard.size, heard.message.step)
+                beat.record(heard.arrival_ns, heard.message.sent_ns, heard.size, heard.message.step)
             if options.seconds is None and watch.clock.now() - told >= SECOND:
                 told += SECOND
                 _tell(beats, options)
-        gaps = watch.gate.gaps
+        gaps = watch.admission.gaps
         watch.tell_refused()
     if options.seconds is not None:
         _tell(beats, options)
@@ -42,12 +42,12 @@ def _measure(configuration: Configuration, options: argparse.Namespace) -> int:
     return NOT_MET if len(silent) == len(beats) else OK
 
 
-def _tell(beats: Mapping[str, Beat], options: argparse.Namespace) -> None:
+def _tell(beats: Mapping[str, StreamStatistics], options: argparse.Namespace) -> None:
     for address, beat in beats.items():
         print(json.dumps(record(address, beat)) if options.json else words(address, beat), flush=True)
 
 
-def record(address: str, beat: Beat) -> dict[str, object]:
+def record(address: str, beat: StreamStatistics) -> dict[str, object]:
     """For programs; times in milliseconds."""
     periods = beat.periods_ms
     return {
@@ -57,7 +57,7 @@ def record(address: str, beat: Beat) -> dict[str, object]:
     }  # fmt: skip
 
 
-def words(address: str, beat: Beat) -> str:
+def words(address: str, beat: StreamStatistics) -> str:
     """For people."""
     rate, jitter, latency = beat.rate, beat.jitter_ms, beat.latency_ms(0.5)
     if latency is None:

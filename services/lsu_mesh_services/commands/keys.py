@@ -14,7 +14,7 @@ from lsu_mesh_services.exit_codes import FAILURE, OK, USAGE
 from lsu_mesh_services.network.certificate_authority import LOOPBACK_HOSTS, Authority
 from lsu_mesh_services.network.security import certificate_file
 
-LONGEST_DAYS = 3650
+MAX_DAYS = 3650
 
 
 def main(options: argparse.Namespace) -> int:
@@ -22,8 +22,8 @@ def main(options: argparse.Namespace) -> int:
     configuration = load_or_explain(options.file, options)
     if configuration is None:
         return USAGE
-    if not 1 <= options.days <= LONGEST_DAYS:
-        print(f"--days {options.days}: expected 1 to {LONGEST_DAYS}", file=sys.stderr)
+    if not 1 <= options.days <= MAX_DAYS:
+        print(f"--days {options.days}: expected 1 to {MAX_DAYS}", file=sys.stderr)
         return USAGE
     try:
         made = make_files(configuration, [*LOOPBACK_HOSTS, *options.host], options.days)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.flows import Flow, flows
 from lsu_mesh_services.exit_codes import OK
-from lsu_mesh_services.monitoring.stream_statistics import Beat
+from lsu_mesh_services.monitoring.stream_statistics import StreamStatistics
 from lsu_mesh_services.monitoring.subscriber import run_tool, watching
 
 
@@ -20,18 +20,18 @@ def main(options: argparse.Namespace) -> int:
 
 def _list(configuration: Configuration, options: argparse.Namespace) -> int:
     published = flows(configuration)
-    beats = {flow.address: Beat() for flow in published}
+    beats = {flow.address: StreamStatistics() for flow in published}
     there: set[str] = set()
     with watching(configuration, options) as watch:
         watch.listen([(flow.topic, flow.name) for flow in published])
-        for heard in watch.heard(options.seconds):
+        for heard in watch.received(options.seconds):
             if heard is None:
                 continue
             if heard.message is None:
                 (there.add if heard.is_there else there.discard)(heard.name)
             else:
                 beat = beats[f"{heard.topic}/{heard.name}"]
-                beat.note(heard.arrival_ns, heard.message.sent_ns, heard.size, heard.message.step)
+                beat.record(heard.arrival_ns, heard.message.sent_ns, heard.size, heard.message.step)
         watch.tell_refused()
     roles = {name: role for role, name in configuration.peers()}
     if options.json:
@@ -41,7 +41,9 @@ def _list(configuration: Configuration, options: argparse.Namespace) -> int:
     return OK
 
 
-def _print_json(published: list[Flow], beats: Mapping[str, Beat], roles: Mapping[str, str], there: set[str]) -> None:
+def _print_json(
+    published: list[Flow], beats: Mapping[str, StreamStatistics], roles: Mapping[str, str], there: set[str]
+) -> None:
     for name in [*roles, *sorted(there - set(roles))]:
         print(json.dumps({"type": "peer", "name": name, "role": roles.get(name), "there": name in there}))
     for flow in published:
@@ -53,7 +55,11 @@ def _print_json(published: list[Flow], beats: Mapping[str, Beat], roles: Mapping
 
 
 def _print_table(
-    published: list[Flow], beats: Mapping[str, Beat], roles: Mapping[str, str], there: set[str], seconds: float
+    published: list[Flow],
+    beats: Mapping[str, StreamStatistics],
+    roles: Mapping[str, str],
+    there: set[str],
+    seconds: float,
 ) -> None:
     from rich.console import Console
     from rich.table import Table

@@ -27,7 +27,7 @@ def _info(options: argparse.Namespace) -> int:
 
 def _repair(options: argparse.Namespace) -> int:
     file = Path(options.file)
-    return _mend([file], _output(options, file, "repaired"), options)
+    return _write_repaired([file], _output(options, file, "repaired"), options)
 
 
 def _merge(options: argparse.Namespace) -> int:
@@ -39,15 +39,15 @@ def _merge(options: argparse.Namespace) -> int:
         if len(files) == 1:
             print(f"{files[0]}: has no later parts beside it; name the files to join", file=sys.stderr)
             return USAGE
-    return _mend(files, _output(options, files[0], "merged"), options)
+    return _write_repaired(files, _output(options, files[0], "merged"), options)
 
 
 def _output(options: argparse.Namespace, file: Path, word: str) -> Path:
     return file.with_name(f"{file.stem}.{word}{file.suffix}") if options.out is None else Path(options.out)
 
 
-def _mend(files: list[Path], target: Path, options: argparse.Namespace) -> int:
-    from lsu_mesh_services.recording.repair import mend
+def _write_repaired(files: list[Path], target: Path, options: argparse.Namespace) -> int:
+    from lsu_mesh_services.recording.repair import repair
 
     if target.exists() and not options.force:
         print(f"{target}: exists already; choose another file with -o, or say --force", file=sys.stderr)
@@ -55,7 +55,7 @@ def _mend(files: list[Path], target: Path, options: argparse.Namespace) -> int:
     before = 0
     try:
         before = sum(file.stat().st_size for file in files)
-        mend(files, target)
+        repair(files, target)
     except OSError as error:
         print(f"{error.filename or target}: {error.strerror or error}", file=sys.stderr)
         return USAGE if isinstance(error, FileNotFoundError) else FAILURE

@@ -11,7 +11,7 @@ from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.configuration import load_or_explain, with_session
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.network.security import certificates, check_endpoints
-from lsu_mesh_services.peer import LONGEST_WAIT
+from lsu_mesh_services.peer import MAX_WAIT
 from lsu_mesh_services.stop import Stop
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"
@@ -50,5 +50,5 @@ def _route(settings: SessionSettings, stop: Stop) -> int:
     with Bus(settings, Clock()):
         print(f"router: listening on {', '.join(settings.listen)}", file=sys.stderr)
         while not stop:
-            time.sleep(LONGEST_WAIT)
+            time.sleep(MAX_WAIT)
     return OK

@@ -15,7 +15,7 @@ from lsu_mesh.mesh.messages import Health
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
 from lsu_mesh_services.exit_codes import NOT_MET, OK
-from lsu_mesh_services.monitoring.stream_statistics import Beat
+from lsu_mesh_services.monitoring.stream_statistics import StreamStatistics
 from lsu_mesh_services.monitoring.subscriber import Heard, Watch, run_tool, watching
 
 RECENT = 100
@@ -43,24 +43,24 @@ class Board:
 
     configuration: Configuration
     observer: HealthObserver
-    beats: dict[str, Beat] = field(default_factory=dict)
+    beats: dict[str, StreamStatistics] = field(default_factory=dict)
     """By peer, of what it publishes last in each step."""
 
-    def note(self, heard: Heard) -> None:
+    def record(self, heard: Heard) -> None:
         """Something has come."""
         if heard.message is None:
-            self.observer.note_presence(heard.name, heard.is_there)
+            self.observer.record_presence(heard.name, heard.is_there)
         elif isinstance(heard.message, Health):
-            self.observer.note(heard.message, heard.arrival_ns)
+            self.observer.record(heard.message, heard.arrival_ns)
         else:
-            beat = self.beats.setdefault(heard.name, Beat(RECENT))
-            beat.note(heard.arrival_ns, heard.message.sent_ns, heard.size, heard.message.step)
+            beat = self.beats.setdefault(heard.name, StreamStatistics(RECENT))
+            beat.record(heard.arrival_ns, heard.message.sent_ns, heard.size, heard.message.step)
 
     def rows(self, now: int) -> list[Row]:
         """Every peer as it is now."""
         found = []
         for health in self.observer.peers(now):
-            beat = self.beats.get(health.name, Beat())
+            beat = self.beats.get(health.name, StreamStatistics())
             is_silent = health.level == "STALE"
             step = max(health.step, beat.step)
             found.append(Row(health, step, None if is_silent else beat.rate, beat.latency_ms(0.5)))
@@ -96,9 +96,9 @@ def _watch(configuration: Configuration, options: argparse.Namespace) -> int:
 
 
 def _listen(watch: Watch, board: Board, seconds: float) -> list[Row]:
-    for heard in watch.heard(seconds):
+    for heard in watch.received(seconds):
         if heard is not None:
-            board.note(heard)
+            board.record(heard)
     return board.rows(watch.clock.now())
 
 
@@ -114,9 +114,9 @@ def _follow(watch: Watch, board: Board) -> list[Row]:
 
     with Live(drawn(), screen=True, auto_refresh=False) as live:
         shown = watch.clock.now()
-        for heard in watch.heard():
+        for heard in watch.received():
             if heard is not None:
-                board.note(heard)
+                board.record(heard)
             if watch.clock.now() - shown > REFRESH_NS:
                 shown = watch.clock.now()
                 live.update(drawn(), refresh=True)

@@ -15,15 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import TYPES, Event, Health, Message, Posterior, Truth
 
 KEPT_STEPS, KEPT_TRUTHS = 8192, 65536
 """Steps that an estimate may be revised in, and be judged in by a truth that comes later."""
-MOST_LATENCIES = 65536
+MAX_LATENCIES = 65536
 """Of more latencies, a random sample of that size is kept."""
-MOST_EVENTS = 1024
+MAX_EVENTS = 1024
 
 
 class Told(NamedTuple):
@@ -44,7 +44,7 @@ class Told(NamedTuple):
 class Sample:
     """All numbers, or a uniform sample of them where there are many (reservoir)."""
 
-    def __init__(self, most: int = MOST_LATENCIES) -> None:
+    def __init__(self, most: int = MAX_LATENCIES) -> None:
         self.numbers = array("d")
         self._most, self._count = most, 0
         self._random = random.Random(0)
@@ -120,11 +120,11 @@ class RunReport:
 
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
-        self._gate = Gate(configuration, TYPES)
+        self._gate = Admission(configuration, TYPES)
         self._truth: dict[int, list[float]] = {}
         self.tracks = {name: Track("filter", settings.kind) for name, settings in configuration.filters.items()}
         self.tracks |= {name: Track("fusion", "fusion") for name in configuration.fusion}
-        self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self.events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self.source_steps: dict[str, int] = {}
         self.links: dict[str, int] = {}
         """How many others each peer is connected to."""
@@ -133,14 +133,14 @@ class RunReport:
         """Take a payload as it came."""
         message = self._gate.admit(key, payload)
         if message is not None:
-            self.note(message, arrival_ns)
+            self.record(message, arrival_ns)
 
-    def note(self, message: Message, arrival_ns: int) -> None:
+    def record(self, message: Message, arrival_ns: int) -> None:
         """Take a message that was let through before."""
         if isinstance(message, Truth):
-            self._note_truth(message)
+            self._record_truth(message)
         elif isinstance(message, Posterior):
-            self._note_posterior(message, arrival_ns)
+            self._record_posterior(message, arrival_ns)
         elif isinstance(message, Event):
             self.events.append(message)
         elif isinstance(message, Health):
@@ -150,7 +150,7 @@ class RunReport:
             elif message.role in ("plant", "sensor"):
                 self.source_steps[message.name] = message.step
 
-    def _note_truth(self, message: Truth) -> None:
+    def _record_truth(self, message: Truth) -> None:
         self._truth[message.step] = message.x
         if len(self._truth) > KEPT_TRUTHS:
             del self._truth[next(iter(self._truth))]
@@ -159,7 +159,7 @@ class RunReport:
             if told is not None and not _holds(told, message.x):
                 track.outside.add(message.step)
 
-    def _note_posterior(self, message: Posterior, arrival_ns: int) -> None:
+    def _record_posterior(self, message: Posterior, arrival_ns: int) -> None:
         track, step = self.tracks[message.name], message.step
         if step <= track.newest - KEPT_STEPS:
             return  # summed up already

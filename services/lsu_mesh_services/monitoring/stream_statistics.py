@@ -6,17 +6,17 @@ import itertools
 import statistics
 from collections import deque
 
-MOST = 4096
+MAX_SAMPLES = 4096
 NS_PER_S, NS_PER_MS = 1e9, 1e6
 
 
-class Beat:
-    """Arrivals of one key.
+class StreamStatistics:
+    """ReceiveQueue of one key.
 
     Latencies compare the clocks of two processes: across hosts they are as good as the hosts' clocks agree.
     """
 
-    def __init__(self, most: int = MOST) -> None:
+    def __init__(self, most: int = MAX_SAMPLES) -> None:
         self._arrivals: deque[int] = deque(maxlen=most)
         self._latencies_ms: deque[float] = deque(maxlen=most)
         self.count = 0
@@ -25,7 +25,7 @@ class Beat:
         self.step = 0
         """The newest step."""
 
-    def note(self, arrival_ns: int, sent_ns: int, size: int, step: int) -> None:
+    def record(self, arrival_ns: int, sent_ns: int, size: int, step: int) -> None:
         """One message."""
         self._arrivals.append(arrival_ns)
         self._latencies_ms.append((arrival_ns - sent_ns) / NS_PER_MS)

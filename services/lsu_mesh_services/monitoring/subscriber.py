@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import key, parse
 from lsu_mesh.mesh.messages import TYPES, Message
@@ -45,7 +45,7 @@ class Watch:
     def __init__(self, configuration: Configuration, bus: Bus, clock: Clock, stop: Stop | None) -> None:
         self.clock = clock
         endless = replace(configuration, mesh=replace(configuration.mesh, steps=None))
-        self.gate = Gate(endless, TYPES)
+        self.admission = Admission(endless, TYPES)
         """Takes steps beyond the configuration's last: the mesh may have been started with another one."""
         self._mesh, self._bus, self._stop = configuration.mesh.name, bus, stop
 
@@ -57,11 +57,11 @@ class Watch:
 
     def tell_refused(self) -> None:
         """On stderr, what came and is no message of this mesh: another model, another version, a stranger's."""
-        refused = self.gate.refused.total()
+        refused = self.admission.refused.total()
         if refused:
-            print(f"{refused} message(s) were refused, the last: {self.gate.last_refusal}", file=sys.stderr)
+            print(f"{refused} message(s) were refused, the last: {self.admission.last_refusal}", file=sys.stderr)
 
-    def heard(self, seconds: float | None = None) -> Iterator[Heard | None]:
+    def received(self, seconds: float | None = None) -> Iterator[Heard | None]:
         """What comes, until the time is over or the process is asked to stop; None now and then where nothing comes."""
         end = None if seconds is None else self.clock.now() + int(seconds * SECOND)
         while not self._stop:
@@ -78,7 +78,7 @@ class Watch:
         topic, name, size = address.topic, address.name, len(arrival.payload)
         if arrival.what != "sample":
             return Heard(topic, name, arrival.arrival_ns, size, None, arrival.what == "alive")
-        message = self.gate.admit(arrival.key, arrival.payload)
+        message = self.admission.admit(arrival.key, arrival.payload)
         return None if message is None else Heard(topic, name, arrival.arrival_ns, size, message)
 
 

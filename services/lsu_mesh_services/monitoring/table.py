@@ -14,7 +14,7 @@ from typing import Self
 from lsu_mesh.mesh.messages import Event
 from lsu_mesh_services.monitoring.run_report import Row
 
-MOST_EVENTS = 8
+MAX_EVENTS = 8
 
 
 class Progress:
@@ -97,9 +97,9 @@ def _print_events(console: object, events: Sequence[Event]) -> None:
 
     assert isinstance(console, Console)
     told = [event for event in events if event.level != "INFO"]
-    for event in told[:MOST_EVENTS]:
+    for event in told[:MAX_EVENTS]:
         console.print(f"{event.level} {event.src}: {event.text}", markup=False, soft_wrap=True)
-    if len(told) > MOST_EVENTS:
+    if len(told) > MAX_EVENTS:
         counts = Counter(f"{event.code} of {event.src}" for event in told)
         listed = ", ".join(f"{count} × {what}" for what, count in counts.most_common())
         console.print(f"{len(told)} events in all: {listed}", markup=False)

@@ -19,7 +19,7 @@ PRIVATE, PUBLIC = 0o600, 0o644
 
 
 class Authority:
-    """Signs certificates; its own key and certificate lie in two files."""
+    """StepArrivals certificates; its own key and certificate lie in two files."""
 
     def __init__(self, certificate: x509.Certificate, key: ec.EllipticCurvePrivateKey) -> None:
         self._certificate = certificate

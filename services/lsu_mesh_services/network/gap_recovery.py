@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 
 SECOND_NS = 1_000_000_000
 LOOK_NS = SECOND_NS // 2
 """Between two looks. After an outage of four seconds publishers keep what was missed for two more."""
-MOST_TRIES = 10
+MAX_TRIES = 10
 """Then the messages have left the publisher's cache, or the publisher is gone."""
 LONG_QUEUE = 1024
 """So much waits to be taken, and what is missing may be in there; questions add to it, so that fewer are asked."""
@@ -21,13 +21,13 @@ PATIENCE_NS = 2 * SECOND_NS
 """Between two looks then: after two of them publishers still have what is missing (``CACHED_SECONDS``)."""
 
 
-class Recovery:
+class GapRecovery:
     """Asks, at each look, for the keys whose gaps have not changed since the look before.
 
     ``ask`` gets a key and brings what its publisher's cache holds; copies are dropped by the gate.
     """
 
-    def __init__(self, gate: Gate, ask: Callable[[str], None]) -> None:
+    def __init__(self, gate: Admission, ask: Callable[[str], None]) -> None:
         self._gate = gate
         self._ask = ask
         self._last = -PATIENCE_NS
@@ -36,7 +36,7 @@ class Recovery:
         self.asked = 0
         """Questions so far."""
 
-    def look(self, now: int, waiting: int = 0) -> None:
+    def check(self, now: int, waiting: int = 0) -> None:
         """Do what is due, less often where so many messages wait to be taken that the peer has enough to do."""
         pause = PATIENCE_NS if waiting > LONG_QUEUE else LOOK_NS
         if now < self._last + pause:
@@ -46,7 +46,7 @@ class Recovery:
         for key, count in gaps.items():
             if self._seen.get(key) != count:
                 self._tries.pop(key, None)  # something comes: wait for the rest
-            elif self._tries.get(key, 0) < MOST_TRIES:
+            elif self._tries.get(key, 0) < MAX_TRIES:
                 self._tries[key] = self._tries.get(key, 0) + 1
                 self.asked += 1
                 self._ask(key)

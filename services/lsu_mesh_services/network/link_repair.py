@@ -19,7 +19,7 @@ FIRST_S, SPREAD_S = 0.3, 0.4
 """Until the first question for a lost peer, and how much longer at random: both ends of a link lose each other."""
 BEGIN_S = 3.0
 """Until the question whether the first attempts have reached everybody."""
-LONGEST_S = 30.0
+MAX_AGE_S = 30.0
 """Between questions for a peer that stays away; each pause is twice the one before."""
 
 
@@ -32,7 +32,7 @@ class Absences:
         """When to ask next, and the pause after that."""
         self._first_look: float | None = begin + BEGIN_S
 
-    def note(self, key: str, is_there: bool, now: float) -> None:
+    def record(self, key: str, is_there: bool, now: float) -> None:
         """A liveliness token has come or gone."""
         if is_there:
             self._there.add(key)
@@ -51,7 +51,7 @@ class Absences:
         """Whether to ask now; plans the next time."""
         late = [key for key, (at, _) in self._absent.items() if at <= now]
         for key in late:
-            pause = min(LONGEST_S, 2 * self._absent[key][1])
+            pause = min(MAX_AGE_S, 2 * self._absent[key][1])
             self._absent[key] = now + pause, pause
         is_first = self._first_look is not None and self._first_look <= now
         if is_first:
@@ -62,11 +62,11 @@ class Absences:
         """Those that are, or may be, there for others; who was never seen here is asked for again from now on."""
         missed = sorted(self._absent if elsewhere is None else set(elsewhere) - self._there)
         for key in missed:
-            self.note(key, False, now)
+            self.record(key, False, now)
         return missed
 
 
-class Reunion:
+class LinkRepair:
     """A thread that sleeps while nobody is missed.
 
     Parameters
@@ -90,10 +90,10 @@ class Reunion:
         self._thread = threading.Thread(target=self._run, name="reunion", daemon=True)
         self._thread.start()
 
-    def note(self, key: str, is_there: bool) -> None:
+    def record(self, key: str, is_there: bool) -> None:
         """A liveliness token has come or gone; never waits for the network."""
         with self._changed:
-            self._absences.note(key, is_there, time.monotonic())
+            self._absences.record(key, is_there, time.monotonic())
             self._changed.notify()
 
     def close(self, patience: float = 2.0) -> None:

@@ -6,7 +6,7 @@ import queue
 import threading
 from typing import NamedTuple
 
-MOST, MOST_BYTES = 65536, 2**26
+MAX_MESSAGES, MAX_BYTES = 65536, 2**26
 """What waits at the most; what comes then is dropped and counted, and may be asked for again later."""
 
 
@@ -19,10 +19,10 @@ class Arrival(NamedTuple):
     arrival_ns: int
 
 
-class Arrivals:
+class ReceiveQueue:
     """A queue that network threads put into and one thread takes from; putting never waits."""
 
-    def __init__(self, most: int = MOST, most_bytes: int = MOST_BYTES) -> None:
+    def __init__(self, most: int = MAX_MESSAGES, most_bytes: int = MAX_BYTES) -> None:
         self._queue: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
         self._most, self._most_bytes = most, most_bytes
         self._lock = threading.Lock()

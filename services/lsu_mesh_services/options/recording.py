@@ -9,7 +9,7 @@ from lsu_mesh_services.options.parsing import EXIT_CODES, Commands, new_command
 
 def add(commands: Commands) -> None:
     """The command ``recording`` and what it does to a recording."""
-    parser = new_command(commands, "recording", "sum up, mend, join and export recordings")
+    parser = new_command(commands, "recording", "sum up, repair, join and export recordings")
     inner = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     info = _new(inner, "info", "what a recording holds: run, peers, messages, gaps, events")
     info.add_argument("file", metavar="FILE.rrd", help="recording; its parts are found beside it")

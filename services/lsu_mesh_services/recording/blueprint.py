@@ -11,7 +11,7 @@ import rerun.blueprint as rrb
 
 from lsu_mesh_services.recording import frame
 from lsu_mesh_services.recording.bands import outline
-from lsu_mesh_services.recording.entity_paths import Names, Output, path
+from lsu_mesh_services.recording.entity_paths import EntityPaths, Output, path
 from lsu_mesh_services.recording.timeline import SIM_TIME, STEP
 
 OVERVIEW_STATES = 6
@@ -29,7 +29,7 @@ LEGEND = 0.28
 Part = rrb.View | rrb.Container
 
 
-def blueprint(names: Names) -> rrb.Blueprint:
+def blueprint(names: EntityPaths) -> rrb.Blueprint:
     """The default blueprint of a mesh."""
     configuration = names.configuration
     tabs: list[Part] = [_overview(names)]
@@ -50,7 +50,7 @@ def blueprint(names: Names) -> rrb.Blueprint:
     )
 
 
-def _overview(names: Names) -> Part:
+def _overview(names: EntityPaths) -> Part:
     shown = list(range(len(names.states)))
     if len(shown) > OVERVIEW_STATES:
         shown = list(dict.fromkeys([*names.axes(), *shown]))[:OVERVIEW_STATES]
@@ -65,7 +65,7 @@ def _overview(names: Names) -> Part:
     return rrb.Horizontal(left, right, column_shares=[2, 3], name="Overview")
 
 
-def _filter(names: Names, name: str, kind: str) -> Part:
+def _filter(names: EntityPaths, name: str, kind: str) -> Part:
     below = [_plot(names, "Widths", [path("widths", name)], legend=True)]
     if names.configuration.filters[name].transfer != "off":
         below.append(_plot(names, "Gain of the transfers [nat]", [path("gain", name)]))
@@ -74,7 +74,7 @@ def _filter(names: Names, name: str, kind: str) -> Part:
     return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=f"{name} ({kind})")
 
 
-def _fusion(names: Names, name: str) -> Part:
+def _fusion(names: EntityPaths, name: str) -> Part:
     several = len(names.configuration.fusion) > 1
     few = len(names.configuration.filters) <= FEW
     space = _space(names, frame.ALL, _sets_of_all(names)) if few else _space(names, name, [_set_of(name)])
@@ -89,7 +89,7 @@ def _fusion(names: Names, name: str) -> Part:
     return rrb.Horizontal(left, _states_of(names, name), column_shares=[2, 3], name=title)
 
 
-def _states_of(names: Names, peer: str) -> Part:
+def _states_of(names: EntityPaths, peer: str) -> Part:
     """Band and error of every state, side by side where there is room, else in tabs."""
     count = len(names.states)
     bands = [_bands(names, i, peer) for i in range(count)]
@@ -101,7 +101,7 @@ def _states_of(names: Names, peer: str) -> Part:
     return rrb.Tabs(_grid("Bands", bands), _grid("Errors", errors), active_tab=0)
 
 
-def _half_widths(names: Names) -> Part:
+def _half_widths(names: EntityPaths) -> Part:
     """What is known of the noise: by how much bounds fail, and the half-widths in force at every filter."""
     configuration = names.configuration
     outputs = [output for output in names.outputs if any(output in names.outputs_of_watcher(w) for w in names.learners)]
@@ -119,7 +119,7 @@ def _half_widths(names: Names) -> Part:
     return rrb.Vertical(factor, _grid("Half-widths", plots), row_shares=[1, 3], name="Bounds")
 
 
-def _mesh(names: Names) -> Part:
+def _mesh(names: EntityPaths) -> Part:
     health = rrb.StateTimelineView(name="Processes", origin="/", contents=["/health/**"])
     latency = _whole(names, "Age of the oldest measurement at arrival [ms]", ["/latency/**"])
     topology = rrb.GraphView(name="Who sends to whom", origin="/topology")
@@ -142,7 +142,7 @@ def _grid(name: str, views: Sequence[Part]) -> Part:
     return rrb.Grid(*views, grid_columns=columns, name=name)
 
 
-def _bands(names: Names, state: int, peer: str | None = None) -> Part:
+def _bands(names: EntityPaths, state: int, peer: str | None = None) -> Part:
     part = names.states[state]
     shown = f"{path('bands', part)}/**" if peer is None else path("bands", part, peer)
     whose = "the bounds of all peers" if peer is None else "its bounds"
@@ -152,18 +152,18 @@ def _bands(names: Names, state: int, peer: str | None = None) -> Part:
     return _plot(names, title, [shown, path("truth", part)], outlined=crowded)
 
 
-def _outlined(names: Names) -> list[str]:
+def _outlined(names: EntityPaths) -> list[str]:
     """Peers whose bands are outlines where all are shown: the filters, unless they are few and there is no fusion."""
     filters = list(names.configuration.filters)
     return filters if names.configuration.fusion or len(filters) > 3 else []
 
 
-def _errors(names: Names, state: int, peer: str) -> Part:
+def _errors(names: EntityPaths, state: int, peer: str) -> Part:
     part = names.states[state]
     return _plot(names, f"{names.label(state)} − truth", [path("errors", part, peer)])
 
 
-def _output(names: Names, output: Output) -> Part:
+def _output(names: EntityPaths, output: Output) -> Part:
     contents = [output.measured(), f"{path('outputs', output.sensor, output.part)}/**"]
     peers = [name for name, one in names.configuration.filters.items() if output.sensor in one.sensors]
     outlined = [output.predicted(peer) for peer in peers] if len(peers) > 3 else []
@@ -180,7 +180,7 @@ def _status() -> Part:
 
 
 def _plot(
-    names: Names,
+    names: EntityPaths,
     name: str,
     contents: list[str],
     *,
@@ -208,11 +208,11 @@ def _plot(
     )
 
 
-def _volume(names: Names) -> Part:
+def _volume(names: EntityPaths) -> Part:
     return _whole(names, "Log-volume of the sets", ["/log_volume/**"])
 
 
-def _whole(names: Names, name: str, contents: list[str]) -> Part:
+def _whole(names: EntityPaths, name: str, contents: list[str]) -> Part:
     """Series over the whole run but for its beginning, with room for the legend at the right."""
     mesh = names.configuration.mesh
     first = SETTLING if mesh.steps is None else min(SETTLING, mesh.steps // 10)
@@ -240,7 +240,7 @@ def _set_of(name: str) -> str:
     return f"{path('space', 'sets', name)}/**"
 
 
-def _sets_of_all(names: Names) -> list[str]:
+def _sets_of_all(names: EntityPaths) -> list[str]:
     """Bodies of all peers; of many filters only the edges, so that the fused set stays visible among them."""
     configuration = names.configuration
     if len(configuration.filters) <= FEW:
@@ -249,7 +249,7 @@ def _sets_of_all(names: Names) -> list[str]:
     return [*(_set_of(name) for name in configuration.fusion), *edges]
 
 
-def _space(names: Names, name: str, sets: list[str]) -> Part:
+def _space(names: EntityPaths, name: str, sets: list[str]) -> Part:
     axes = [names.states[axis] for axis in names.axes()]
     origin = frame.entity(name)
     title = f"Sets of {', '.join(axes)}" + (" with the truth (pink)" if names.truth_is_known else "")

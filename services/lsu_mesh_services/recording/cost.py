@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Measurement, Posterior, Prediction, Truth
-from lsu_mesh_services.recording.entity_paths import Names, path
+from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.set_geometry import body, project
-from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, MadeUpMesh, written
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, SyntheticMesh, written
 
 NAIVE_STEPS = 60
 
@@ -50,7 +50,7 @@ def measure(filters: int = 12, states: int = 3, rate: float = 200.0, steps: int 
     """Record ``steps`` steps of a mesh of so many filters at ``rate`` steps per second."""
     with tempfile.TemporaryDirectory() as folder:
         configuration = written(Path(folder), states, filters, 1.0 / rate)
-        arrivals = paced(MadeUpMesh(configuration), steps, rate)
+        arrivals = paced(SyntheticMesh(configuration), steps, rate)
         gc.collect()
         gc.freeze()  # the prepared messages are no garbage of the recorder
         target = Path(folder) / "batched.rrd"
@@ -75,7 +75,7 @@ def measure(filters: int = 12, states: int = 3, rate: float = 200.0, steps: int 
     )
 
 
-def paced(mesh: MadeUpMesh, steps: int, rate: float) -> list[Arrival]:
+def paced(mesh: SyntheticMesh, steps: int, rate: float) -> list[Arrival]:
     """The messages of a run with the arrivals that they have at this rate."""
     return [
         arrival._replace(arrival_ns=START_NS + int(k / rate * 1e9) + 1000 * i)
@@ -112,7 +112,7 @@ class Naive:
     def __init__(self, configuration: Configuration, target: Path) -> None:
         self.stream = rr.RecordingStream("naive")
         self.stream.set_sinks(rr.FileSink(target))
-        self._names = Names(configuration)
+        self._names = EntityPaths(configuration)
         self._axes = self._names.axes()
         self._every = round(1.0 / configuration.mesh.dt / configuration.recorder.mesh_hz)
         self._truth = np.zeros(len(self._names.states))

@@ -74,8 +74,8 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Names:
-    """Names that a configuration gives to what is drawn."""
+class EntityPaths:
+    """EntityPaths that a configuration gives to what is drawn."""
 
     configuration: Configuration
     states: tuple[str, ...] = field(init=False)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.mesh.messages import Posterior, Truth
 from lsu_mesh_services.recording.bands import band_columns, band_style, error_columns, error_style, line_style
-from lsu_mesh_services.recording.entity_paths import Names, path
+from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import TRUTH, Color
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
@@ -42,7 +42,7 @@ class Estimates:
     """Collects estimates and truths, joins them by step, and sends them in batches."""
 
     def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: Names, colors: dict[str, Color]
+        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
     ) -> None:
         self._stream = stream
         self._timelines = timelines

@@ -11,7 +11,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from lsu_mesh_services.recording.entity_paths import Names, path
+from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import OTHER
 from lsu_mesh_services.recording.timeline import Moment, Timelines, one_row
 
@@ -22,7 +22,7 @@ LANE = 0.3
 UNIFORM = 5.0
 """Axes whose scales differ by no more than this factor share one scale, so that angles are true."""
 READABLE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
-LARGEST_RATIO = 4.0
+MAX_RATIO = 4.0
 """A set wider than this many times the narrowest does not widen the common frame."""
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ def entity(name: str) -> str:
 class Frame:
     """One frame: its centre and scale (3,) each, changed in readable jumps only."""
 
-    def __init__(self, stream: rr.RecordingStream, timelines: Timelines, names: Names, name: str) -> None:
+    def __init__(self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, name: str) -> None:
         self._stream = stream
         self._timelines = timelines
         self._entity = entity(name)

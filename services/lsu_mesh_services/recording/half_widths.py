@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 
 from lsu_mesh.mesh.messages import Posterior, Suggestion
-from lsu_mesh_services.recording.entity_paths import Names, path
+from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import IDENTIFIER, OTHER, Color
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
@@ -30,7 +30,7 @@ class HalfWidths:
     """Collects half-widths and sends them in batches."""
 
     def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: Names, colors: dict[str, Color]
+        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
     ) -> None:
         self._stream = stream
         self._timelines = timelines

@@ -9,7 +9,7 @@ import rerun as rr
 
 from lsu_mesh.mesh.messages import Measurement, Prediction
 from lsu_mesh_services.recording.bands import band_columns, band_style
-from lsu_mesh_services.recording.entity_paths import Names, Output
+from lsu_mesh_services.recording.entity_paths import EntityPaths, Output
 from lsu_mesh_services.recording.palette import OTHER, Color
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
@@ -18,7 +18,7 @@ class Outputs:
     """Collects measurements and output predictions and sends them in batches."""
 
     def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: Names, colors: dict[str, Color]
+        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
     ) -> None:
         self._stream = stream
         self._timelines = timelines

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple, TypeVar
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load_values
 from lsu_mesh.mesh.messages import TYPES, Message
 from lsu_mesh_services.recording.raw import ARCHETYPE, REFUSED
-from lsu_mesh_services.recording.repair import mend
+from lsu_mesh_services.recording.repair import repair
 
 Found = TypeVar("Found")
 PROPERTIES = "/__properties/lsu_mesh"
@@ -65,7 +65,7 @@ def read_recording(path: Path) -> Recording:
     files = parts(path)
     description = read_description(files[0])
     configuration = recorded_configuration(path, description)
-    gate = Gate(configuration, TYPES)
+    gate = Admission(configuration, TYPES)
     received, damaged = [], []
     for raw in read_raw(*files):
         duplicates = gate.duplicates
@@ -98,7 +98,7 @@ def recorded_configuration(path: Path, description: dict[str, str]) -> Configura
 def read_description(path: Path) -> dict[str, str]:
     """What the recorder wrote of the run; empty where it did not."""
     described: dict[str, str] = {}
-    for batch in _mended(path, lambda file: _batches(file, PROPERTIES)):
+    for batch in _repaired(path, lambda file: _batches(file, PROPERTIES)):
         for name, column in zip(batch.schema.names, batch.columns, strict=True):
             values = [] if name.startswith("rerun.") else _flat(column)
             if values:
@@ -112,12 +112,12 @@ def read_raw(*paths: Path, refused: bool = False) -> list[RawMessage]:
     Several paths are parts of one recording. Raises ``FileNotFoundError``, or ``ValueError`` where a file is no
     recording.
     """
-    rows = [row for path in paths for row in _mended(path, lambda file: _read(file, refused))]
+    rows = [row for path in paths for row in _repaired(path, lambda file: _read(file, refused))]
     rows.sort(key=lambda row: row[0])
     return [message for _, message in rows]
 
 
-def _mended(path: Path, read: Callable[[Path], list[Found]]) -> list[Found]:
+def _repaired(path: Path, read: Callable[[Path], list[Found]]) -> list[Found]:
     """What ``read`` finds; of a file in which a message is cut short, what is whole, from a mended copy."""
     if not path.is_file():
         raise FileNotFoundError(2, "no such recording", str(path))
@@ -126,7 +126,7 @@ def _mended(path: Path, read: Callable[[Path], list[Found]]) -> list[Found]:
     except RuntimeError:
         with tempfile.TemporaryDirectory(prefix="read-") as folder:
             copy = Path(folder) / "mended.rrd"
-            mend([path], copy)
+            repair([path], copy)
             return read(copy)
 
 

@@ -14,13 +14,13 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.ledger import Ledger
 from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Suggestion, Truth
 from lsu_mesh_services.recording import palette
-from lsu_mesh_services.recording.entity_paths import Names
+from lsu_mesh_services.recording.entity_paths import EntityPaths
 from lsu_mesh_services.recording.estimates import Estimates
 from lsu_mesh_services.recording.events import Events
 from lsu_mesh_services.recording.half_widths import HalfWidths
 from lsu_mesh_services.recording.outputs import Outputs
 from lsu_mesh_services.recording.raw import RawStore
-from lsu_mesh_services.recording.sets_3d import Space
+from lsu_mesh_services.recording.sets_3d import Sets3D
 from lsu_mesh_services.recording.status import StatusLanes
 from lsu_mesh_services.recording.stream import open_stream
 from lsu_mesh_services.recording.timeline import Moment, Timelines
@@ -87,7 +87,7 @@ class Recorder:
         serve_port: int | None = None,
         continues: Path | None = None,
     ) -> None:
-        self._names = names = Names(configuration)
+        self._names = names = EntityPaths(configuration)
         timelines = Timelines(configuration.mesh.dt)
         colors = palette.colors(configuration)
         self.path = path
@@ -95,7 +95,7 @@ class Recorder:
         self._stream = stream = open_stream(names, path, run_properties, serve_port, continues)
         self._raw = RawStore(stream, timelines)
         self._estimates = Estimates(stream, timelines, names, colors)
-        self._space = Space(stream, timelines, names, colors)
+        self._space = Sets3D(stream, timelines, names, colors)
         self._outputs = Outputs(stream, timelines, names, colors)
         self._half_widths = HalfWidths(stream, timelines, names, colors)
         self._status = StatusLanes(stream, timelines, configuration)
@@ -167,11 +167,11 @@ class Recorder:
     def _put(self, store: Callable[[], None]) -> None:
         """Hand what waits to Rerun and have it written; any of its calls may hang once its file writer has ended."""
         if not self._broken:
-            self._guarded(f"looking at {self.path.parent}", self._look_at_space)
+            self._guarded(f"looking at {self.path.parent}", self._check_free_space)
         if not self._broken and not ends_within(HANGS_S, store):
             self._guarded("giving up", self._give_up)
 
-    def _look_at_space(self) -> None:
+    def _check_free_space(self) -> None:
         """Give up while there is room to end the file: after an error of the disk Rerun may hang for ever."""
         size, free = self.path.stat().st_size, shutil.disk_usage(self.path.parent).free
         grown, self._size = size - (self._size or size), size
@@ -191,7 +191,7 @@ class Recorder:
         written = self._guarded(f"writing {self.path}", self._write)
         if stored and written and not self._broken:
             for key, boot, seq in unflushed:
-                self._ledger.note(key, boot, seq)
+                self._ledger.record(key, boot, seq)
             self._ledger.flush()
 
     def _write(self) -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 MAGIC = b"RRF2"
 
 
-def mend(sources: Sequence[Path], target: Path) -> None:
+def repair(sources: Sequence[Path], target: Path) -> None:
     """Join recordings, whole or cut short, into one compact file, which appears only when it is complete.
 
     ``target`` may be one of the sources. Parts become one recording where each later one ``continues`` the first.

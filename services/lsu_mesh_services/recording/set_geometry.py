@@ -36,7 +36,7 @@ _FACES = np.array([[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2
 _BOX_EDGES = np.array([[a, a | (1 << axis)] for a in range(8) for axis in range(3) if not a >> axis & 1])
 
 
-class Body(NamedTuple):
+class SetGeometry(NamedTuple):
     """Triangles (t, 3, 3), their normals (t, 3) and edges (e, 2, 3)."""
 
     triangles: Array
@@ -44,7 +44,7 @@ class Body(NamedTuple):
     edges: Array
 
 
-EMPTY = Body(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 2, 3)))
+EMPTY = SetGeometry(np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros((0, 2, 3)))
 
 
 def project(message: SupportMessage, axes: tuple[int, ...]) -> Support:
@@ -62,7 +62,7 @@ def project(message: SupportMessage, axes: tuple[int, ...]) -> Support:
     return Zonotope(support.center[rows], support.generators[rows])
 
 
-def body(support: Support) -> Body:
+def body(support: Support) -> SetGeometry:
     """Triangles and edges of a set of dimension 1, 2 or 3; missing coordinates are 0."""
     if isinstance(support, Orthotope) and support.dim == 3:
         half = 0.5 * (support.upper - support.lower)
@@ -73,15 +73,15 @@ def body(support: Support) -> Body:
     return hull_body(np.pad(vertices, ((0, 0), (0, 3 - support.dim))))
 
 
-def rectangle(lower: float, upper: float, middle: float, half_height: float) -> Body:
+def rectangle(lower: float, upper: float, middle: float, half_height: float) -> SetGeometry:
     """An interval as a bar ``[lower, upper]`` around the height ``middle``."""
     y0, y1 = middle - half_height, middle + half_height
     loop = np.array([[lower, y0, 0.0], [upper, y0, 0.0], [upper, y1, 0.0], [lower, y1, 0.0]])
     triangles = loop[[[0, 1, 2], [0, 2, 3]]]
-    return Body(triangles, _normals(triangles), np.stack([loop, np.roll(loop, -1, axis=0)], axis=1))
+    return SetGeometry(triangles, _normals(triangles), np.stack([loop, np.roll(loop, -1, axis=0)], axis=1))
 
 
-def hull_body(points: Array) -> Body:
+def hull_body(points: Array) -> SetGeometry:
     """Triangles and edges of the convex hull of points (k, 3), flat or not."""
     if not len(points):
         return EMPTY
@@ -101,14 +101,14 @@ def hull_body(points: Array) -> Body:
     return EMPTY._replace(edges=points[[along.argmin(), along.argmax()]][None])
 
 
-def _parallelepiped(center: Array, generators: Array) -> Body:
+def _parallelepiped(center: Array, generators: Array) -> SetGeometry:
     corners = center + _CORNERS @ generators.T
     quads = corners[_FACES if np.linalg.det(generators) >= 0 else _FACES[:, ::-1]]
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-    return Body(triangles, _normals(triangles), corners[_BOX_EDGES])
+    return SetGeometry(triangles, _normals(triangles), corners[_BOX_EDGES])
 
 
-def _polyhedron(points: Array, local: Array) -> Body | None:
+def _polyhedron(points: Array, local: Array) -> SetGeometry | None:
     hull = _qhull(local)
     if hull is None:
         return None
@@ -118,7 +118,7 @@ def _polyhedron(points: Array, local: Array) -> Body | None:
     simplices = hull.simplices.copy()
     simplices[flipped] = simplices[flipped][:, ::-1]
     triangles = points[simplices]
-    return Body(triangles, _normals(triangles), points[_creases(hull)])
+    return SetGeometry(triangles, _normals(triangles), points[_creases(hull)])
 
 
 def _creases(hull: _Hull) -> Indices:
@@ -132,14 +132,14 @@ def _creases(hull: _Hull) -> Indices:
     return np.asarray(hull.simplices[facet][rows, others], dtype=np.int64)
 
 
-def _polygon(points: Array, local: Array, normal: Array) -> Body | None:
+def _polygon(points: Array, local: Array, normal: Array) -> SetGeometry | None:
     hull = _qhull(local)
     if hull is None:
         return None
     loop = points[hull.vertices]
     fan = np.stack([np.broadcast_to(loop[0], loop[2:].shape), loop[1:-1], loop[2:]], axis=1)
     edges = np.stack([loop, np.roll(loop, -1, axis=0)], axis=1)
-    return Body(fan, np.broadcast_to(normal, (len(fan), 3)), edges)
+    return SetGeometry(fan, np.broadcast_to(normal, (len(fan), 3)), edges)
 
 
 class _Hull(NamedTuple):

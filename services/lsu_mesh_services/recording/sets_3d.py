@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from lsu_mesh.mesh.messages import Posterior, SupportMessage, Truth
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh_services.recording import frame
-from lsu_mesh_services.recording.entity_paths import Names, path
+from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import TRUTH, Color
-from lsu_mesh_services.recording.set_geometry import EMPTY, Body, body, project, rectangle
+from lsu_mesh_services.recording.set_geometry import EMPTY, SetGeometry, body, project, rectangle
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
-LONGEST_PAUSE_NS = 2_000_000_000
+MAX_PAUSE_NS = 2_000_000_000
 """However slow the bodies are, some are drawn."""
 GRACE_NS = 1_000_000_000
 """How long a chosen step waits for its last set; all sets of one moment shall be of one step."""
@@ -33,7 +33,7 @@ SHARE = 0.15
 """Largest share of the wall clock that may go into bodies."""
 
 CROSS = 1.1
-"""Reach of the lines through the truth, in units of the view."""
+"""OpenLoop of the lines through the truth, in units of the view."""
 IN_FRONT = 0.03
 """How far in front of flat sets the truth is drawn."""
 FLAT = rr.components.PointShading.Flat
@@ -50,7 +50,7 @@ class _Set(NamedTuple):
 
 class _Drawn(NamedTuple):
     moment: Moment
-    body: Body
+    body: SetGeometry
 
 
 class _Truth(NamedTuple):
@@ -60,11 +60,11 @@ class _Truth(NamedTuple):
     """How far the cross through it goes, per coordinate."""
 
 
-class Space:
+class Sets3D:
     """Chooses the steps to draw, makes the bodies and sends them in batches."""
 
     def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: Names, colors: dict[str, Color]
+        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
     ) -> None:
         self._stream = stream
         self._timelines = timelines
@@ -107,7 +107,7 @@ class Space:
         if len(self._truths) > REMEMBERED:
             del self._truths[next(iter(self._truths))]
         if message.step in self._drawn_steps:
-            self._note_truth(Moment(message.step, arrival_ns), message.x)
+            self._record_truth(Moment(message.step, arrival_ns), message.x)
 
     def flush(self) -> None:
         """Make and send the bodies of the steps whose sets are all there or have waited long enough."""
@@ -133,7 +133,7 @@ class Space:
         failed, self._failed = self._failed, None
         if steps:
             spent = (time.perf_counter_ns() - began) / len(steps)
-            self._pause_ns = min(max(self._interval_ns, int(spent / SHARE)), LONGEST_PAUSE_NS)
+            self._pause_ns = min(max(self._interval_ns, int(spent / SHARE)), MAX_PAUSE_NS)
         if failed is not None:
             raise failed
 
@@ -150,7 +150,7 @@ class Space:
         if step not in self._drawn_steps:
             self._drawn_steps[step] = None
             if step in self._truths:
-                self._note_truth(sets[0].moment, self._truths[step])
+                self._record_truth(sets[0].moment, self._truths[step])
             for peer in self._shown - {one.peer for one in sets}:  # whoever is silent must not show an old set
                 drawn[peer].append(_Drawn(sets[0].moment, EMPTY))
                 self._shown.discard(peer)
@@ -171,7 +171,7 @@ class Space:
         due = self._next_ns + self._pause_ns
         self._next_ns = due if due > arrival_ns else arrival_ns + self._pause_ns
 
-    def _look(self, one: _Set, shape: Body) -> None:
+    def _look(self, one: _Set, shape: SetGeometry) -> None:
         """Let the frames follow: each peer's own, and the common one, which follows the fusion where there is one."""
         if not len(shape.edges):
             return
@@ -185,10 +185,10 @@ class Space:
             extents = np.array(list(self._extents.values()))
             reach = np.maximum(extents[:, 1] - center, center - extents[:, 0]).max(axis=0)
             widths = 0.5 * (extents[:, 1] - extents[:, 0])
-            seen = np.minimum(reach, frame.LARGEST_RATIO * widths.min(axis=0))
+            seen = np.minimum(reach, frame.MAX_RATIO * widths.min(axis=0))
             self._frames[frame.ALL].look_at(one.moment, center, np.maximum(seen, half))
 
-    def _body(self, one: _Set) -> Body:
+    def _body(self, one: _Set) -> SetGeometry:
         if len(self._axes) == 1:
             return rectangle(one.lower, one.upper, self._lanes.get(one.peer, 0.0), 0.4 * frame.LANE)
         return body(project(one.message, self._axes))
@@ -204,7 +204,7 @@ class Space:
         lines = rr.LineStrips3D.columns(strips=strips).partition([len(one.body.edges) for one in drawn])
         self._stream.send_columns(path("space", "sets", peer, "edges"), times, lines)
 
-    def _note_truth(self, moment: Moment, x: list[float]) -> None:
+    def _record_truth(self, moment: Moment, x: list[float]) -> None:
         """The true state, and how far its cross must go to be seen outside of the sets that hold it."""
         place, reach = np.zeros(3), np.zeros(3)
         place[: len(self._axes)] = np.array(x)[list(self._axes)]

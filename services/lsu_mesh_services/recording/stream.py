@@ -20,16 +20,16 @@ from rerun.chunk import RrdReader
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh_services.recording.blueprint import blueprint
-from lsu_mesh_services.recording.entity_paths import Names
-from lsu_mesh_services.recording.repair import mend
+from lsu_mesh_services.recording.entity_paths import EntityPaths
+from lsu_mesh_services.recording.repair import repair
 
-LONGEST_INDEXED_S = 300.0
+MAX_INDEXED_S = 300.0
 """Runs that are longer have no index of their chunks at the end of the file: until then it would grow in memory."""
 PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "rerun-sdk")
 
 
 def open_stream(
-    names: Names,
+    names: EntityPaths,
     path: Path,
     run_properties: Mapping[str, str],
     serve_port: int | None = None,
@@ -60,7 +60,7 @@ def open_stream(
 
 def _is_short(configuration: Configuration) -> bool:
     steps, rate = configuration.mesh.steps, configuration.mesh.rate or 1.0 / configuration.mesh.dt
-    return steps is not None and steps <= LONGEST_INDEXED_S * rate
+    return steps is not None and steps <= MAX_INDEXED_S * rate
 
 
 def recording_id(path: Path) -> str | None:
@@ -70,7 +70,7 @@ def recording_id(path: Path) -> str | None:
             return _recording_id(path)
         except RuntimeError:
             with tempfile.TemporaryDirectory(prefix="part-") as folder:
-                mend([path], Path(folder) / "mended.rrd")
+                repair([path], Path(folder) / "mended.rrd")
                 return _recording_id(Path(folder) / "mended.rrd")
     except (OSError, ValueError):
         return None

@@ -55,7 +55,7 @@ def written(folder: Path, states: int = 3, filters: int = 3, dt: float = 0.02) -
     return load(path)
 
 
-class MadeUpMesh:
+class SyntheticMesh:
     """Messages of a mesh whose truth wanders and whose sets hold it by construction."""
 
     def __init__(self, configuration: Configuration, seed: int = 1) -> None:

@@ -77,7 +77,7 @@ def _run(configuration: Configuration, recording: Recording) -> tuple[list[Timed
     """Everything that the nodes publish, and how long it took once the kernels were loaded."""
     replay = Replay(configuration, (Timed(one.arrival_ns, one.message) for one in recording.received))
     for node in replay.nodes.values():
-        node.rehearse()
+        node.warm_up()
     gc.disable()  # nearly all that is made stays: to search it for garbage takes an eighth of a replay
     try:
         began = time.perf_counter()
@@ -137,10 +137,10 @@ def _print(
 ) -> None:
     old, new = RunReport(recording.configuration), RunReport(replayed)
     for one in recording.received:
-        old.note(one.message, one.arrival_ns)
+        old.record(one.message, one.arrival_ns)
     sources = [(one.arrival_ns, one.message) for one in recording.received if isinstance(one.message, SOURCES)]
     for now, message in sorted([*sources, *made], key=lambda timed: timed[0]):
-        new.note(message, now)
+        new.record(message, now)
     rows = [("recorded", row) for row in old.rows()] + [("replayed", row) for row in new.rows()]
     run = max((row.last_step for _, row in rows), default=0) / recording.configuration.mesh.rate
     speed = run / seconds if seconds else 0.0

@@ -12,7 +12,7 @@ from lsu_mesh.mesh.verification import Verification, verify
 from lsu_mesh_services.exit_codes import NOT_MET, OK
 from lsu_mesh_services.recording.read import Recording
 
-MOST_SHOWN = 5
+MAX_SHOWN = 5
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,9 @@ def _verdict(report: Report) -> list[str]:
         lines.append("the recording holds no set that could be recomputed")
     if found.unverifiable:
         lines.append(f"{len(found.unverifiable)} sets are unverifiable, because the recorder missed what they used:")
-        lines += [f"  {missing}" for missing in found.unverifiable[:MOST_SHOWN]]
-        if len(found.unverifiable) > MOST_SHOWN:
-            lines.append(f"  and {len(found.unverifiable) - MOST_SHOWN} more; --json lists all")
+        lines += [f"  {missing}" for missing in found.unverifiable[:MAX_SHOWN]]
+        if len(found.unverifiable) > MAX_SHOWN:
+            lines.append(f"  and {len(found.unverifiable) - MAX_SHOWN} more; --json lists all")
     return lines
 
 

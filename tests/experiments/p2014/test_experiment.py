@@ -152,7 +152,7 @@ def test_every_number_of_the_papers_tables_has_a_verdict(monkeypatch: pytest.Mon
     for name in ("1", "2", "3"):
         rows = tables[f"p2014-table-{name}"].rows
         assert all(str(row[-1]).startswith((*VERDICTS, "–")) for row in rows)
-    assert tables.WELL in {row[0] for row in third}
+    assert WELL in {row[0] for row in third}
 
 
 @pytest.mark.soak

@@ -304,9 +304,9 @@ def prediction(src: str, boot: str, epoch: int, descent: Sequence[tuple[str, str
 
 def test_an_epoch_that_was_relied_on_through_another_peer_is_left_too() -> None:
     epochs = Epochs("filter/me", "0" * 16)
-    epochs.rely(prediction("filter/b", "b" * 16, 0, [("filter/c", "c" * 16, 2)]))
+    epochs.add_dependency(prediction("filter/b", "b" * 16, 0, [("filter/c", "c" * 16, 2)]))
     assert epochs.descent == [("filter/b", "b" * 16, 0), ("filter/c", "c" * 16, 2)]
-    epochs.note(prediction("filter/d", "d" * 16, 0, [("filter/c", "c" * 16, 3)]))
+    epochs.record(prediction("filter/d", "d" * 16, 0, [("filter/c", "c" * 16, 3)]))
     assert epochs.abandoned == "filter/c"
     epochs.begin()
     assert epochs.abandoned is None
@@ -319,11 +319,11 @@ def test_an_epoch_that_was_relied_on_through_another_peer_is_left_too() -> None:
 @given(st.lists(st.tuples(st.integers(0, 30), st.integers(0, 3)), max_size=200))
 def test_what_was_relied_on_is_remembered_however_many_boots_come(messages: list[tuple[int, int]]) -> None:
     epochs = Epochs("filter/me", "0" * 16)
-    epochs.rely(prediction("filter/b", "b" * 16, 1))
+    epochs.add_dependency(prediction("filter/b", "b" * 16, 1))
     for boot, epoch in messages:
-        epochs.note(prediction("filter/b", f"{boot:016x}", epoch))
+        epochs.record(prediction("filter/b", f"{boot:016x}", epoch))
     assert epochs.abandoned is None
-    epochs.note(prediction("filter/b", "b" * 16, 2))
+    epochs.record(prediction("filter/b", "b" * 16, 2))
     assert epochs.abandoned == "filter/b"
 
 
@@ -339,7 +339,7 @@ def test_a_step_that_is_done_again_finds_the_inputs_by_which_an_old_fused_box_wa
     def carry(address: str, payload: bytes, node: Any) -> bool:
         if node.name != "fb":
             return True
-        message = node.gate.__class__(node.configuration, {"fused", "measurement"}).admit(address, payload)
+        message = node.admission.__class__(node.configuration, {"fused", "measurement"}).admit(address, payload)
         if message is None or not (message.topic == "fused" and 20 < message.step < 40):
             is_late = message is not None and message.topic == "measurement" and message.step == 30 and not kept
             if is_late:

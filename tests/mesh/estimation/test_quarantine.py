@@ -16,7 +16,7 @@ class Story:
         self.quarantine = Quarantine(["a", "b"], after, history)
         self.said: list[tuple[int, str, bool]] = []
 
-    def note(self, k: int, left_out: str = "", agreed: str = "") -> None:
+    def record(self, k: int, left_out: str = "", agreed: str = "") -> None:
         def say(name: str, is_in: bool) -> Message:
             self.said.append((k, name, is_in))
             return Event(
@@ -25,32 +25,32 @@ class Story:
             )  # fmt: skip
 
         count = len(self.said)
-        messages = self.quarantine.note(k, set(left_out), set(agreed), say)
+        messages = self.quarantine.record(k, set(left_out), set(agreed), say)
         assert len(messages) == len(self.said) - count
 
 
 def test_a_source_goes_in_after_so_many_steps_and_comes_out_after_as_many_that_agree() -> None:
     story = Story(after=3)
     for k in range(1, 6):
-        story.note(k, left_out="a", agreed="b")
+        story.record(k, left_out="a", agreed="b")
     for k in range(6, 10):
-        story.note(k, agreed="ab")
+        story.record(k, agreed="ab")
     assert story.said == [(3, "a", True), (8, "a", False)]
 
 
 def test_a_source_that_lies_every_other_step_goes_in_and_stays() -> None:
     story = Story(after=3)
     for k in range(1, 21):
-        story.note(k, left_out="a" if k % 2 else "", agreed="b" if k % 2 else "ab")
+        story.record(k, left_out="a" if k % 2 else "", agreed="b" if k % 2 else "ab")
     assert story.said == [(5, "a", True)]
 
 
 def test_a_source_that_is_not_there_is_neither_left_out_nor_does_it_agree() -> None:
     story = Story(after=2)
     for k in (1, 2):
-        story.note(k, left_out="a")
+        story.record(k, left_out="a")
     for k in range(3, 30):
-        story.note(k, agreed="b")
+        story.record(k, agreed="b")
     assert story.quarantine.members == {"a"}
 
 
@@ -58,11 +58,11 @@ def test_steps_that_are_done_again_count_once() -> None:
     story = Story(after=3)
     for _ in range(5):
         for k in (1, 2):
-            story.note(k, left_out="a", agreed="b")
+            story.record(k, left_out="a", agreed="b")
     assert story.quarantine.members == set()
-    story.note(3, left_out="a")
+    story.record(3, left_out="a")
     assert story.quarantine.members == {"a"}
-    story.note(2, agreed="a")
+    story.record(2, agreed="a")
     assert story.quarantine.members == set(), "step 2 was found to be fine after all"
 
 
@@ -74,9 +74,9 @@ def test_steps_that_are_done_again_count_once() -> None:
 def test_what_is_done_again_at_once_changes_nothing(steps: list[tuple[bool, bool]], after: int, history: int) -> None:
     plain, noisy = Story(after, history), Story(after, history)
     for k, (first, second) in enumerate(steps, start=1):
-        plain.note(k, left_out="a" if second else "", agreed="" if second else "a")
-        noisy.note(k, left_out="a" if first else "", agreed="" if first else "a")
-        noisy.note(k, left_out="a" if second else "", agreed="" if second else "a")
+        plain.record(k, left_out="a" if second else "", agreed="" if second else "a")
+        noisy.record(k, left_out="a" if first else "", agreed="" if first else "a")
+        noisy.record(k, left_out="a" if second else "", agreed="" if second else "a")
         assert noisy.quarantine.members == plain.quarantine.members
 
 
@@ -84,5 +84,5 @@ def test_a_count_is_forgotten_after_long_agreement() -> None:
     story = Story(after=4)
     for k in range(1, 100):
         is_wrong = k % 5 == 0
-        story.note(k, left_out="a" if is_wrong else "", agreed="" if is_wrong else "a")
+        story.record(k, left_out="a" if is_wrong else "", agreed="" if is_wrong else "a")
     assert story.said == []

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lsu_mesh import LSUO, LSUModel, Orthotope
-from lsu_mesh.mesh.estimation.warm_up import rehearse
+from lsu_mesh.mesh.estimation.warm_up import warm_up
 
 SCRIPT = """
 import gc
@@ -31,7 +31,7 @@ def loaded():
 
 node = FilterNode(load(Path(sys.argv[1])), sys.argv[2], "0" * 16)
 before = node.engine.bounds()
-node.rehearse()
+node.warm_up()
 assert np.array_equal(before, node.engine.bounds()), "left as it was"
 known = loaded()
 box = Orthotope([-4.0] * 3, [4.0] * 3)
@@ -59,5 +59,5 @@ def test_a_state_that_leaves_its_domain_in_the_rehearsal_ends_only_that() -> Non
     model = LSUModel(A=[[2.0]], B=None, C=[[1.0]], rho=[0.1], r=[0.5], domain=Orthotope([0.0], [9.0]))
     engine = LSUO(model, Orthotope([4.0], [5.0]))
     before = np.array(engine.bounds())
-    rehearse(engine, None)
+    warm_up(engine, None)
     assert np.array_equal(before, engine.bounds())

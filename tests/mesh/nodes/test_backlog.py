@@ -74,7 +74,7 @@ AT_ONCE = 100
 
 
 @pytest.fixture(scope="module")
-def heard(module_mesh: Callable[..., Any]) -> Any:
+def received(module_mesh: Callable[..., Any]) -> Any:
     """What was said in a mesh of 2000 steps whose estimators keep up."""
     mesh = module_mesh("mesh.steps=2000", "mesh.rate=40.0", 'fusion.main.sources=["box","para"]')
     mesh.kill("cz")
@@ -87,7 +87,7 @@ def heard(module_mesh: Callable[..., Any]) -> Any:
 def test_one_that_gets_more_than_a_tick_does_stays_bounded_says_so_and_catches_up(
     heard: Any, monkeypatch: pytest.MonkeyPatch, role: str, name: str
 ) -> None:
-    monkeypatch.setattr(estimator, "MOST_AT_ONCE", AT_ONCE)
+    monkeypatch.setattr(estimator, "MAX_AT_ONCE", AT_ONCE)
     monkeypatch.setattr(fusion, "FAR_BEHIND", 10**6)
     node = heard.start(role, name)
     kinds = Input | Measurement if role == "filter" else Input | Posterior

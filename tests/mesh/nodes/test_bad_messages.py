@@ -34,7 +34,7 @@ from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
 
 ROOT = Path(__file__).resolve().parents[3]
-LONGEST_NS = 10_000_000
+MAX_AGE_NS = 10_000_000
 """Of the thread's processor time, per message."""
 FUZZED = int(os.environ.get("LSU_MESH_FUZZED", "1000000"))
 """Messages per decoder and node in the full run."""
@@ -71,7 +71,7 @@ def decoded_in_time(topic: str, payload: bytes) -> Message | None:
     except Refused:
         return None
     finally:
-        assert time.thread_time_ns() - began < LONGEST_NS
+        assert time.thread_time_ns() - began < MAX_AGE_NS
 
 
 @pytest.mark.parametrize("topic", TYPES)
@@ -239,7 +239,7 @@ class Collections:
         self.took_ns = self._began = 0
         gc.callbacks.append(self._note)
 
-    def _note(self, phase: str, about: dict[str, int]) -> None:
+    def _record_message(self, phase: str, about: dict[str, int]) -> None:
         if phase == "start":
             self._began = time.thread_time_ns()
         else:
@@ -276,10 +276,10 @@ def node_ids() -> list[str]:
 def test_hostile_messages_neither_kill_nor_slow_a_node(number: int) -> None:
     configuration = configuration_of()
     node = nodes_of(configuration)[number]
-    node.rehearse()
+    node.warm_up()
     times = assault(configuration, node, number, 300)
-    assert sorted(times)[-2] < LONGEST_NS
-    assert node.health(10**12).counters["received"] + node.gate.refused.total() + node.gate.duplicates >= 300
+    assert sorted(times)[-2] < MAX_AGE_NS
+    assert node.health(10**12).counters["received"] + node.admission.refused.total() + node.admission.duplicates >= 300
 
 
 def test_a_set_of_monstrous_complexity_is_refused() -> None:
@@ -291,7 +291,7 @@ def test_a_set_of_monstrous_complexity_is_refused() -> None:
     }
     node = FusionNode(configuration, "main", "f" * 16)
     node.deliver("lsu/v1/demo/posterior/box", msgpack.packb(fields), SECOND)
-    assert node.gate.refused == {"complexity": 1}
+    assert node.admission.refused == {"complexity": 1}
 
 
 @pytest.mark.parametrize("role", ["fusion", "filter"])
@@ -312,7 +312,7 @@ def test_a_set_that_is_empty_kills_nobody(role: str) -> None:
     )
     node.deliver("lsu/v1/demo/input/plant", msgpack.packb(drive), SECOND)
     node.deliver("lsu/v1/demo/posterior/cz", msgpack.packb(fields), SECOND)
-    assert node.gate.refused == {}
+    assert node.admission.refused == {}
     for second in range(2, 6):
         node.tick(second * SECOND)
     assert node.last_posterior is None or node.last_posterior.status != "ok"
@@ -327,7 +327,7 @@ def test_a_step_behind_the_end_of_the_mesh_is_refused() -> None:
     configuration = configuration_of("mesh.steps=10")
     node = FilterNode(configuration, "box", "f" * 16)
     node.deliver("lsu/v1/demo/measurement/s1", measurement(configuration, 12, 0), SECOND)
-    assert node.gate.refused == {"step": 1}
+    assert node.admission.refused == {"step": 1}
 
 
 def test_a_step_from_the_future_does_not_make_the_present_late(tmp_path: Path) -> None:
@@ -357,7 +357,7 @@ def test_a_step_from_the_future_does_not_make_the_present_late(tmp_path: Path) -
 def test_a_million_hostile_messages_per_node(number: int) -> None:
     configuration = configuration_of()
     node = nodes_of(configuration)[number]
-    node.rehearse()
+    node.warm_up()
     gc.collect()
     gc.freeze()  # as a peer does
     assault(configuration, node, 0, FUZZED // 100)
@@ -371,7 +371,7 @@ def test_a_million_hostile_messages_per_node(number: int) -> None:
         f"memory grew by {grown / 2**20:.1f} MiB",
         flush=True,
     )
-    assert slowest < LONGEST_NS
+    assert slowest < MAX_AGE_NS
     assert grown < 100 * 2**20
 
 

@@ -106,7 +106,7 @@ def test_a_copy_changes_nothing(mesh_of: MakeMesh) -> None:
         mesh.hand_over(address, encode(message))
     mesh.run(DURATION - 0.3)
     assert [p.support for p in mesh.posteriors("box")] == [p.support for p in orderly.posteriors("box")]
-    assert mesh.nodes["box"].gate.duplicates > 0
+    assert mesh.nodes["box"].admission.duplicates > 0
 
 
 def test_a_missing_input_is_waited_for_and_never_guessed(mesh_of: MakeMesh) -> None:

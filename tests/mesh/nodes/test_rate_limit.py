@@ -11,7 +11,7 @@ from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Measurement, Truth
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.plant import PlantNode
-from lsu_mesh.mesh.nodes.rate_limit import HURRY, SETTLING_NS, Pace
+from lsu_mesh.mesh.nodes.rate_limit import HURRY, SETTLING_NS, RateLimit
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.mesh.nodes.sensor import FileSensorNode
 
@@ -20,7 +20,7 @@ BACK_S = 1.5
 """Links are back after so long, at the latest."""
 
 
-def published(pace: Pace, late: int, seconds: float) -> list[tuple[int, int]]:
+def published(pace: RateLimit, late: int, seconds: float) -> list[tuple[int, int]]:
     """Times and steps of a source that is so many steps late at time 0, and is told when to go on."""
     now, behind, out = 10 * SECOND, float(late), []
     begin, end = now, now + int(seconds * SECOND)
@@ -35,7 +35,7 @@ def published(pace: Pace, late: int, seconds: float) -> list[tuple[int, int]]:
 
 
 def test_a_source_in_time_never_waits() -> None:
-    pace = Pace(RATE, KEPT)
+    pace = RateLimit(RATE, KEPT)
     for k in range(2000):
         now = int(k / RATE * SECOND)
         assert pace.take(1, now) == 1
@@ -44,25 +44,25 @@ def test_a_source_in_time_never_waits() -> None:
 
 @pytest.mark.parametrize("late", [500, 5000])
 def test_what_goes_out_before_links_are_back_is_kept(late: int) -> None:
-    out = published(Pace(RATE, KEPT), late, BACK_S)
+    out = published(RateLimit(RATE, KEPT), late, BACK_S)
     assert KEPT // 3 <= sum(steps for _, steps in out) <= KEPT
 
 
 def test_a_source_that_is_late_by_less_than_it_may_send_at_once_is_in_time_at_once() -> None:
-    out = published(Pace(RATE, KEPT), KEPT // 3, 0.01)
+    out = published(RateLimit(RATE, KEPT), KEPT // 3, 0.01)
     assert out[0] == (0, KEPT // 3)
 
 
 def test_then_it_hurries_and_gets_there() -> None:
     late = 500
-    out = published(Pace(RATE, KEPT), late, 20.0)
+    out = published(RateLimit(RATE, KEPT), late, 20.0)
     in_time = next(at for at, _ in out if sum(s for t, s in out if t <= at) >= late + at * RATE / SECOND - 1)
     expected = SETTLING_NS / SECOND + (late - KEPT // 3) / ((HURRY - 1) * RATE)
     assert in_time / SECOND == pytest.approx(expected, rel=0.05)
 
 
 def test_a_time_that_it_names_is_one_at_which_a_step_may_go_out() -> None:
-    pace = Pace(RATE, KEPT)
+    pace = RateLimit(RATE, KEPT)
     now = 0
     for _ in range(500):
         pace.take(1000, now)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.estimation.step_record import Base
 from lsu_mesh.mesh.messages import Posterior
 from lsu_mesh.mesh.nodes.estimator import Estimator
@@ -17,7 +17,7 @@ from lsu_mesh.mesh.simulator.run import Outcome, run_seed
 from lsu_mesh.supports.support import Support
 
 STEPS = 60
-MOST_SEEDS = 100
+MAX_SEEDS = 100
 
 
 @pytest.fixture(autouse=True)
@@ -30,18 +30,18 @@ def fresh_references() -> Iterator[None]:
 
 def seeds_until_found(demo: Path, faults: tuple[str, ...] = FAULTS) -> tuple[int, Outcome]:
     """How many seeds it takes until an invariant is broken."""
-    for seed in range(1, MOST_SEEDS + 1):
+    for seed in range(1, MAX_SEEDS + 1):
         outcome = run_seed(demo, seed, STEPS, faults)
         if outcome.broken:
             return seed, outcome
-    raise AssertionError(f"not found in {MOST_SEEDS} seeds")
+    raise AssertionError(f"not found in {MAX_SEEDS} seeds")
 
 
 def test_a_stale_set_taken_as_current_is_found(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begin = Estimator._begin
 
     def begin_now(self: Estimator, k: int, support: Support, base: Base, *, restarted: bool) -> None:
-        begin(self, max(k, self._signs.newest), support, base, restarted=restarted)
+        begin(self, max(k, self._step_arrivals.newest), support, base, restarted=restarted)
 
     monkeypatch.setattr(Estimator, "_begin", begin_now)
     _, outcome = seeds_until_found(demo)
@@ -49,7 +49,7 @@ def test_a_stale_set_taken_as_current_is_found(demo: Path, monkeypatch: pytest.M
 
 
 def test_a_lost_dedupe_is_found(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Gate, "_is_new", lambda self, key, message: True)
+    monkeypatch.setattr(Admission, "_is_new", lambda self, key, message: True)
     _, outcome = seeds_until_found(demo)
     assert outcome.broken.startswith("dedupe"), outcome.broken
 

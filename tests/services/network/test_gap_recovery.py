@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lsu_mesh_services.network.gap_recovery import LOOK_NS, MOST_TRIES, SECOND_NS, Recovery
+from lsu_mesh_services.network.gap_recovery import LOOK_NS, MAX_TRIES, SECOND_NS, GapRecovery
 
-from lsu_mesh.mesh.admission import Gate
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.config.settings import CACHED_SECONDS
 from lsu_mesh.mesh.keys import key
@@ -31,29 +31,29 @@ def payload(configuration: Configuration, seq: int) -> bytes:
 
 
 @pytest.fixture
-def gate(configuration: Configuration) -> Gate:
+def gate(configuration: Configuration) -> Admission:
     """Has seen 0, 1 and 5."""
-    gate = Gate(configuration, ["input"])
+    gate = Admission(configuration, ["input"])
     for seq in (0, 1, 5):
         assert gate.admit(INPUT, payload(configuration, seq)) is not None
     return gate
 
 
-def test_a_gap_that_stays_is_asked_for_at_each_look_and_not_forever(gate: Gate) -> None:
+def test_a_gap_that_stays_is_asked_for_at_each_look_and_not_forever(gate: Admission) -> None:
     asked: list[str] = []
-    recovery = Recovery(gate, asked.append)
-    recovery.look(0)
+    recovery = GapRecovery(gate, asked.append)
+    recovery.check(0)
     assert asked == [], "the subscriber's own recovery comes first"
-    recovery.look(LOOK_NS - 1)
+    recovery.check(LOOK_NS - 1)
     assert asked == []
-    recovery.look(LOOK_NS)
+    recovery.check(LOOK_NS)
     assert asked == [INPUT]
     for look in range(2, 20):
-        recovery.look(look * LOOK_NS)
-    assert asked == [INPUT] * MOST_TRIES
+        recovery.check(look * LOOK_NS)
+    assert asked == [INPUT] * MAX_TRIES
 
 
-def test_a_gap_that_closes_is_asked_for_no_more(gate: Gate, configuration: Configuration) -> None:
+def test_a_gap_that_closes_is_asked_for_no_more(gate: Admission, configuration: Configuration) -> None:
     asked: list[str] = []
 
     def ask(address: str) -> None:
@@ -61,34 +61,34 @@ def test_a_gap_that_closes_is_asked_for_no_more(gate: Gate, configuration: Confi
         for seq in range(6):
             gate.admit(address, payload(configuration, seq))
 
-    recovery = Recovery(gate, ask)
+    recovery = GapRecovery(gate, ask)
     for second in range(5):
-        recovery.look(second * SECOND_NS)
+        recovery.check(second * SECOND_NS)
     assert asked == [INPUT]
     assert (gate.gaps, gate.gaps_by_key()) == (0, {})
 
 
-def test_a_peer_that_has_more_than_enough_to_do_asks_less_often_and_while_publishers_remember(gate: Gate) -> None:
+def test_a_peer_that_has_more_than_enough_to_do_asks_less_often_and_while_publishers_remember(gate: Admission) -> None:
     asked: list[int] = []
     second = 0
-    recovery = Recovery(gate, lambda _: asked.append(second))
+    recovery = GapRecovery(gate, lambda _: asked.append(second))
     for second in range(6):
-        recovery.look(second * SECOND_NS, waiting=5000)
+        recovery.check(second * SECOND_NS, waiting=5000)
     assert asked == [2, 4], "it looks at 0, 2 and 4"
     assert asked[0] < CACHED_SECONDS
     for second in (6, 7):
-        recovery.look(second * SECOND_NS, waiting=10)
+        recovery.check(second * SECOND_NS, waiting=10)
     assert asked == [2, 4, 6, 7]
 
 
-def test_while_messages_come_the_rest_is_waited_for(gate: Gate, configuration: Configuration) -> None:
+def test_while_messages_come_the_rest_is_waited_for(gate: Admission, configuration: Configuration) -> None:
     asked: list[str] = []
-    recovery = Recovery(gate, asked.append)
-    recovery.look(0)
+    recovery = GapRecovery(gate, asked.append)
+    recovery.check(0)
     gate.admit(INPUT, payload(configuration, 3))
-    recovery.look(SECOND_NS)
+    recovery.check(SECOND_NS)
     assert asked == []
-    recovery.look(2 * SECOND_NS)
+    recovery.check(2 * SECOND_NS)
     assert asked == [INPUT]
 
 

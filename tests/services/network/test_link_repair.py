@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 
 import pytest
-from lsu_mesh_services.network.link_repair import BEGIN_S, FIRST_S, LONGEST_S, SPREAD_S, Absences, Reunion
+from lsu_mesh_services.network.link_repair import BEGIN_S, FIRST_S, MAX_AGE_S, SPREAD_S, Absences, LinkRepair
 
 
 def asked_at(absences: Absences, until: float, since: float = 0.0) -> list[float]:
@@ -24,40 +24,40 @@ def asked_at(absences: Absences, until: float, since: float = 0.0) -> list[float
 
 def test_once_at_the_begin_it_asks_who_is_there_and_never_again() -> None:
     absences = Absences(begin=10.0)
-    absences.note("a", True, 10.1)
+    absences.record("a", True, 10.1)
     assert asked_at(absences, 1000.0) == [10.0 + BEGIN_S]
 
 
 def test_a_lost_peer_is_asked_for_soon_and_then_less_and_less_often() -> None:
     absences = Absences(begin=0.0)
     asked_at(absences, BEGIN_S)
-    absences.note("a", True, 4.0)
-    absences.note("a", False, 5.0)
+    absences.record("a", True, 4.0)
+    absences.record("a", False, 5.0)
     times = asked_at(absences, 300.0)
     pauses = [later - earlier for earlier, later in itertools.pairwise(times)]
     assert FIRST_S <= times[0] - 5.0 <= FIRST_S + SPREAD_S
     assert pauses[:4] == pytest.approx([2 * FIRST_S, 4 * FIRST_S, 8 * FIRST_S, 16 * FIRST_S])
-    assert pauses[-1] == pytest.approx(LONGEST_S), "and it never gives up"
+    assert pauses[-1] == pytest.approx(MAX_AGE_S), "and it never gives up"
 
 
 def test_a_peer_that_is_back_is_not_asked_for() -> None:
     absences = Absences(begin=0.0)
     asked_at(absences, BEGIN_S)
-    absences.note("a", False, 5.0)
-    absences.note("a", True, 5.1)
+    absences.record("a", False, 5.0)
+    absences.record("a", True, 5.1)
     assert absences.next_at() is None
-    absences.note("a", False, 6.0)
+    absences.record("a", False, 6.0)
     times = asked_at(absences, 7.0)
     assert times[0] <= 6.0 + FIRST_S + SPREAD_S, "a new absence begins with the short pauses"
 
 
 def test_only_those_that_others_see_are_missed() -> None:
     absences = Absences(begin=0.0)
-    absences.note("seen", True, 0.1)
-    absences.note("lost", False, 0.2)
-    absences.note("dead", False, 0.2)
+    absences.record("seen", True, 0.1)
+    absences.record("lost", False, 0.2)
+    absences.record("dead", False, 0.2)
     assert absences.missed({"seen", "lost", "new"}, 1.0) == ["lost", "new"]
-    absences.note("lost", True, 1.1)
+    absences.record("lost", True, 1.1)
     assert absences.missed({"seen", "lost", "new"}, 1.2) == ["new"], "and it is asked for again"
     assert asked_at(absences, 30.0)
 
@@ -65,8 +65,8 @@ def test_only_those_that_others_see_are_missed() -> None:
 def test_where_nobody_may_tell_all_who_were_lost_may_be_there() -> None:
     absences = Absences(begin=0.0)
     assert absences.missed(None, 0.1) == []
-    absences.note("seen", True, 0.1)
-    absences.note("lost", False, 0.2)
+    absences.record("seen", True, 0.1)
+    absences.record("lost", False, 0.2)
     assert absences.missed(None, 1.0) == ["lost"]
 
 
@@ -81,7 +81,7 @@ class Mesh:
         self.asked = threading.Semaphore(0)
         self.introduced = threading.Event()
         self.returns: list[str] = []
-        self.reunion = Reunion(self.ask, self.introduce)
+        self.reunion = LinkRepair(self.ask, self.introduce)
 
     def ask(self) -> set[str]:
         self.asked.release()
@@ -90,7 +90,7 @@ class Mesh:
     def introduce(self, is_over: Callable[[], bool]) -> None:
         assert not is_over()
         for key in self.returns:
-            self.reunion.note(key, True)
+            self.reunion.record(key, True)
         assert is_over() == bool(self.returns)
         self.introduced.set()
 
@@ -98,7 +98,7 @@ class Mesh:
 def test_a_peer_that_others_see_is_brought_back(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = Mesh(monkeypatch)
     mesh.elsewhere, mesh.returns = {"a"}, ["a"]
-    mesh.reunion.note("a", False)
+    mesh.reunion.record("a", False)
     assert mesh.introduced.wait(5)
     mesh.reunion.close()
     assert mesh.reunion.introductions == 1
@@ -107,8 +107,8 @@ def test_a_peer_that_others_see_is_brought_back(monkeypatch: pytest.MonkeyPatch)
 def test_a_dead_peer_costs_a_question_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh = Mesh(monkeypatch)
     mesh.elsewhere = {"b"}
-    mesh.reunion.note("b", True)
-    mesh.reunion.note("a", False)
+    mesh.reunion.record("b", True)
+    mesh.reunion.record("a", False)
     for _ in range(3):
         assert mesh.asked.acquire(timeout=5)
     mesh.reunion.close()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import threading
 
-from lsu_mesh_services.network.receive_queue import Arrival, Arrivals
+from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
 
 
 def sample(size: int, number: int = 0) -> Arrival:
     return Arrival("sample", f"key/{number}", bytes(size), number)
 
 
-def taken(arrivals: Arrivals) -> list[Arrival]:
+def taken(arrivals: ReceiveQueue) -> list[Arrival]:
     found = []
     while (arrival := arrivals.next(0)) is not None:
         found.append(arrival)
@@ -19,7 +19,7 @@ def taken(arrivals: Arrivals) -> list[Arrival]:
 
 
 def test_what_comes_is_taken_in_its_order() -> None:
-    arrivals = Arrivals()
+    arrivals = ReceiveQueue()
     sent = [sample(3, number) for number in range(100)]
     for arrival in sent:
         arrivals.put(arrival)
@@ -30,7 +30,7 @@ def test_what_comes_is_taken_in_its_order() -> None:
 
 
 def test_a_full_queue_drops_what_comes_and_counts_it() -> None:
-    arrivals = Arrivals(most=10)
+    arrivals = ReceiveQueue(most=10)
     for number in range(25):
         arrivals.put(sample(3, number))
     assert arrivals.dropped == 15
@@ -40,7 +40,7 @@ def test_a_full_queue_drops_what_comes_and_counts_it() -> None:
 
 
 def test_few_large_payloads_fill_the_queue_too() -> None:
-    arrivals = Arrivals(most_bytes=1000)
+    arrivals = ReceiveQueue(most_bytes=1000)
     for _ in range(3):
         for _ in range(10):
             arrivals.put(sample(400))
@@ -49,14 +49,14 @@ def test_few_large_payloads_fill_the_queue_too() -> None:
 
 
 def test_who_comes_and_goes_is_told_even_by_a_full_queue() -> None:
-    arrivals = Arrivals(most=1)
+    arrivals = ReceiveQueue(most=1)
     arrivals.put(sample(3))
     arrivals.put(Arrival("gone", "live/s1", b"", 1))
     assert [arrival.what for arrival in taken(arrivals)] == ["sample", "gone"]
 
 
 def test_threads_that_put_at_once_lose_no_byte_of_the_account() -> None:
-    arrivals = Arrivals(most_bytes=10**9)
+    arrivals = ReceiveQueue(most_bytes=10**9)
 
     def put() -> None:
         for _ in range(5000):
@@ -69,7 +69,7 @@ def test_threads_that_put_at_once_lose_no_byte_of_the_account() -> None:
     while any(thread.is_alive() for thread in threads) or len(arrivals):
         count += arrivals.next(0.01) is not None
     assert count == 20_000
-    full = Arrivals(most_bytes=100)
+    full = ReceiveQueue(most_bytes=100)
     full.put(sample(100))
     full.put(sample(1))
     assert (len(full), full.dropped) == (1, 1)

@@ -14,7 +14,7 @@ from lsu_mesh_services.exit_codes import FAILURE, OK, USAGE
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part
-from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh, written
+from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh, written
 from recorded_mesh import record
 
 from lsu_mesh.mesh.config import load
@@ -39,7 +39,7 @@ def recording(mesh: LocalMesh, tmp_path_factory: pytest.TempPathFactory) -> Path
 def in_two_parts(tmp_path: Path) -> list[Path]:
     """The parts of a recorder that was started again; the first is cut short."""
     configuration = written(tmp_path, 2, 2)
-    mesh, made = MadeUpMesh(configuration), []
+    mesh, made = SyntheticMesh(configuration), []
     for number in (1, 2):
         made.append(next_part(tmp_path / "run.rrd"))
         recorder = Recorder(configuration, made[-1], continues=made[0] if number > 1 else None)

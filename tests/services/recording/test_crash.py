@@ -14,19 +14,19 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.repair import mend
+from lsu_mesh_services.recording.repair import repair
 from lsu_mesh_services.recording.stream import next_part
-from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh, written
+from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh, written
 
 WRITER = """
 import sys, time
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh
+from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh
 from lsu_mesh.mesh.config import load
 from lsu_mesh_services.recording.recorder import Recorder
 recorder = Recorder(load(Path(sys.argv[2])), Path(sys.argv[3]))
-mesh, told = MadeUpMesh(load(Path(sys.argv[2]))), 0
+mesh, told = SyntheticMesh(load(Path(sys.argv[2]))), 0
 for k in range(1, 100000):
     for arrival in mesh.step(k):
         recorder.record(arrival.key, arrival.payload, time.time_ns(), arrival.message)
@@ -92,21 +92,21 @@ def test_a_file_cut_anywhere_gives_what_was_whole(
     found = read_raw(cut)
     assert set(found) <= set(everything)
     assert len(found) >= 0.5 * share * len(everything) - 100
-    mend([cut], cut)
+    repair([cut], cut)
     assert read_raw(cut) == found
     assert [entry.name for entry in folder.iterdir()] == ["cut.rrd"]
 
 
 def test_parts_are_joined(tmp_path: Path) -> None:
     configuration = written(tmp_path, 2, 2)
-    mesh, parts = MadeUpMesh(configuration), []
+    mesh, parts = SyntheticMesh(configuration), []
     for number in (1, 2):
         parts.append(next_part(tmp_path / "run.rrd"))
         recorder = Recorder(configuration, parts[-1], continues=parts[0] if number > 1 else None)
         for arrival in mesh.run(20):
             recorder.record(*arrival)
         recorder.close()
-    mend(parts, tmp_path / "joined.rrd")
+    repair(parts, tmp_path / "joined.rrd")
     assert [part.name for part in parts] == ["run.rrd", "run.part2.rrd"]
     assert len(read_raw(parts[1])) > 100
     assert read_raw(tmp_path / "joined.rrd") == read_raw(parts[0]) + read_raw(parts[1])
@@ -117,7 +117,7 @@ def whole_recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("whole")
     configuration = written(folder, 2, 2)
     recorder = Recorder(configuration, folder / "whole.rrd")
-    for arrival in MadeUpMesh(configuration).run(200):
+    for arrival in SyntheticMesh(configuration).run(200):
         recorder.record(*arrival)
         recorder.tick(arrival.arrival_ns)
     recorder.close()

@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 from hypothesis import given
 from hypothesis import strategies as st
-from lsu_mesh_services.recording.entity_paths import Names
+from lsu_mesh_services.recording.entity_paths import EntityPaths
 from lsu_mesh_services.recording.frame import READABLE, Frame, readable_scale
 from lsu_mesh_services.recording.synthetic_mesh import written
 from lsu_mesh_services.recording.timeline import Moment, Timelines
@@ -39,7 +39,7 @@ def test_flat_sets_have_a_scale(half_widths: list[float]) -> None:
 def test_the_scale_stays_while_the_set_breathes_and_jumps_when_it_grows(tmp_path: Path) -> None:
     stream = rr.RecordingStream("frames")
     stream.memory_recording()
-    frame = Frame(stream, Timelines(0.02), Names(written(tmp_path)), "f1")
+    frame = Frame(stream, Timelines(0.02), EntityPaths(written(tmp_path)), "f1")
     shown = []
     for k, size in enumerate([0.9, 1.0, 0.7, 0.95, 1.05, 4.0, 3.5, 0.5]):
         frame.look_at(Moment(k, k), np.zeros(3), np.full(3, size))

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from local_mesh import LocalMesh
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.synthetic_mesh import MadeUpMesh, written
+from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh, written
 from msgspec import structs
 from recorded_mesh import record
 from rerun.chunk import RrdReader
@@ -56,7 +56,7 @@ def test_the_half_widths_are_those_of_the_messages(mesh: LocalMesh, tmp_path: Pa
 def test_nothing_is_drawn_where_nothing_can_change(tmp_path: Path) -> None:
     configuration = written(tmp_path)
     recorder = Recorder(configuration, tmp_path / "fixed.rrd")
-    for arrival in MadeUpMesh(configuration).run(10):
+    for arrival in SyntheticMesh(configuration).run(10):
         recorder.record(*arrival)
     recorder.close()
     entities = {chunk.entity_path for chunk in RrdReader(recorder.path).stream()}

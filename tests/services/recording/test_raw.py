@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lsu_mesh_services.recording.read import RawMessage, read_raw
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, MadeUpMesh, written
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, SyntheticMesh, written
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import decode
@@ -19,7 +19,7 @@ Record = Callable[[Configuration, Sequence[Arrival]], Path]
 
 
 def test_every_payload_comes_back_in_order(configuration: Configuration, record: Record) -> None:
-    arrivals = MadeUpMesh(configuration).run(40)
+    arrivals = SyntheticMesh(configuration).run(40)
     arrivals[7], arrivals[90] = arrivals[90], arrivals[7]  # late and early messages
     read = read_raw(record(configuration, arrivals))
     assert read == [RawMessage(a.key, a.arrival_ns, a.payload) for a in arrivals]
@@ -35,7 +35,7 @@ def test_refused_payloads_are_kept_apart(
 ) -> None:
     path = tmp_path_factory.mktemp("refused") / "x.rrd"
     recorder = Recorder(configuration, path)
-    good = MadeUpMesh(configuration).step(1)
+    good = SyntheticMesh(configuration).step(1)
     for one in refused:
         recorder.record(*one, None)
     for arrival in good:
@@ -60,7 +60,7 @@ def test_a_file_that_is_no_recording(tmp_path: Path) -> None:
 def test_one_flush_holds_what_came_before_it(tmp_path: Path) -> None:
     configuration = written(tmp_path)
     recorder = Recorder(configuration, tmp_path / "x.rrd")
-    arrivals = MadeUpMesh(configuration).run(30)
+    arrivals = SyntheticMesh(configuration).run(30)
     half = len(arrivals) // 2
     for arrival in arrivals[:half]:
         recorder.record(*arrival)

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.repair import mend
-from lsu_mesh_services.recording.set_geometry import Body, body
+from lsu_mesh_services.recording.repair import repair
+from lsu_mesh_services.recording.set_geometry import SetGeometry, body
 from lsu_mesh_services.recording.stream import next_part
-from lsu_mesh_services.recording.synthetic_mesh import START_NS, STEP_NS, Arrival, MadeUpMesh, written
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, STEP_NS, Arrival, SyntheticMesh, written
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
@@ -66,7 +66,7 @@ def has_index(path: Path) -> bool:
 
 @pytest.fixture
 def arrivals(configuration: Configuration) -> list[Arrival]:
-    return MadeUpMesh(configuration).run(60)
+    return SyntheticMesh(configuration).run(60)
 
 
 @pytest.mark.parametrize(("override", "is_short"), [("mesh.steps=15000", True), ("mesh.steps=15001", False)])
@@ -76,7 +76,7 @@ def test_only_short_runs_have_an_index_which_grows_in_memory_till_their_end(
     path = record(load(configuration.path, [override]), arrivals)
     assert has_index(path) is is_short
     assert [message.payload for message in read_raw(path)] == [arrival.payload for arrival in arrivals]
-    mend([path], path)
+    repair([path], path)
     assert has_index(path)
     assert [message.payload for message in read_raw(path)] == [arrival.payload for arrival in arrivals]
 
@@ -107,7 +107,7 @@ def test_truth_bands_and_errors_are_the_numbers_of_the_messages(
 
 
 def test_errors_wait_for_a_truth_that_comes_late(configuration: Configuration, record: Record) -> None:
-    mesh = MadeUpMesh(configuration)
+    mesh = SyntheticMesh(configuration)
     arrivals = mesh.run(30)
     late = [a for a in arrivals if not isinstance(a.message, Truth)] + [
         a for a in arrivals if isinstance(a.message, Truth)
@@ -160,7 +160,7 @@ def test_sets_are_thinned_to_common_steps_and_numbers_are_not(
 
 
 def test_a_peer_that_fell_silent_shows_no_old_set(configuration: Configuration, record: Record) -> None:
-    arrivals = [a for a in MadeUpMesh(configuration).run(200) if a.message.name != "f2" or a.message.step < 60]
+    arrivals = [a for a in SyntheticMesh(configuration).run(200) if a.message.name != "f2" or a.message.step < 60]
     path = record(configuration, arrivals)
     shown = drawn(path, "/space/sets/f2", "Mesh3D:vertex_positions")
     assert [bool(corners) for step, corners in shown if step < 60] == [True] * (len(shown) - 1)
@@ -170,7 +170,7 @@ def test_a_peer_that_fell_silent_shows_no_old_set(configuration: Configuration, 
 
 
 def test_status_lanes_change_only_when_the_status_does(configuration: Configuration, record: Record) -> None:
-    mesh = MadeUpMesh(configuration)
+    mesh = SyntheticMesh(configuration)
     box = Orthotope([-1, -1, -1], [1, 1, 1])
     course = ["ok", "ok", "inconsistent", "inconsistent", "predicted", "ok"]
     arrivals = [mesh.arrival(mesh.posterior("filter/f1", k + 1, box, status=s), k + 1) for k, s in enumerate(course)]
@@ -203,7 +203,7 @@ def test_status_lanes_change_only_when_the_status_does(configuration: Configurat
 def test_what_is_said_again_of_an_older_step_does_not_change_the_lane_of_the_newest(
     configuration: Configuration, record: Record
 ) -> None:
-    mesh = MadeUpMesh(configuration)
+    mesh = SyntheticMesh(configuration)
     box = Orthotope([-1, -1, -1], [1, 1, 1])
     sources, rejected = ["f1", "f2", "f3"], [Rejection(source="f2", reason="disjoint")]
     fused = [
@@ -221,7 +221,7 @@ def test_what_is_said_again_of_an_older_step_does_not_change_the_lane_of_the_new
 def test_peers_that_go_are_seen_in_lanes_graph_and_events(configuration: Configuration, tmp_path: Path) -> None:
     path = tmp_path / "x.rrd"
     recorder = Recorder(configuration, path)
-    mesh = MadeUpMesh(configuration)
+    mesh = SyntheticMesh(configuration)
     recorder.peer_changed("filter", "f1", True, START_NS)
     for arrival in mesh.run(5):
         recorder.record(*arrival)
@@ -253,7 +253,7 @@ def test_the_end_of_a_run_is_no_series_of_failures(configuration: Configuration,
     recorder = Recorder(configuration, tmp_path / "x.rrd")
     for name in ("f1", "f2"):
         recorder.peer_changed("filter", name, True, START_NS)
-    for arrival in MadeUpMesh(configuration).run(5):
+    for arrival in SyntheticMesh(configuration).run(5):
         recorder.record(*arrival)
     for name in ("f1", "f2"):
         recorder.peer_changed("filter", name, False, START_NS + 6 * STEP_NS)
@@ -276,7 +276,7 @@ def test_a_departure_is_drawn_when_nothing_follows_for_long(configuration: Confi
 
 def test_what_cannot_be_drawn_is_counted_and_stored_all_the_same(configuration: Configuration, tmp_path: Path) -> None:
     recorder = Recorder(configuration, tmp_path / "x.rrd")
-    mesh = MadeUpMesh(configuration)
+    mesh = SyntheticMesh(configuration)
     arrivals = mesh.run(3)
     flat = Orthotope([0.0], [1.0])  # one coordinate in a mesh of three
     wrong = [
@@ -297,7 +297,7 @@ def test_what_cannot_be_drawn_is_counted_and_stored_all_the_same(configuration: 
 
 def test_problems_are_counted_by_kind(configuration: Configuration, tmp_path: Path) -> None:
     recorder = Recorder(configuration, tmp_path / "x.rrd")
-    mesh = MadeUpMesh(configuration)
+    mesh = SyntheticMesh(configuration)
     for k in range(3):
         stamp = mesh.stamp("measurement", "sensor/s1", k)
         recorder.record(*mesh.arrival(Measurement(**stamp, y=[1.0, 2.0], time_ns=0), k))
@@ -310,14 +310,14 @@ def test_problems_are_counted_by_kind(configuration: Configuration, tmp_path: Pa
 def test_a_set_that_cannot_be_drawn_leaves_the_others_be(
     configuration: Configuration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def unlucky(support: Support) -> Body:
+    def unlucky(support: Support) -> SetGeometry:
         if isinstance(support, ConstrainedZonotope):
             raise ArithmeticError("no vertices today")
         return body(support)
 
     recorder = Recorder(configuration, tmp_path / "x.rrd")
     monkeypatch.setattr("lsu_mesh_services.recording.sets_3d.body", unlucky)
-    for arrival in MadeUpMesh(configuration).run(3):
+    for arrival in SyntheticMesh(configuration).run(3):
         recorder.record(*arrival)
     recorder.close()
     assert recorder.problems == ["drawing space: ArithmeticError: no vertices today"]
@@ -420,7 +420,7 @@ def test_no_network_is_opened_unless_asked(configuration: Configuration, tmp_pat
 
 
 def test_every_entity_is_documented(configuration: Configuration, root: Path, record: Record) -> None:
-    arrivals = MadeUpMesh(configuration).run(5)
+    arrivals = SyntheticMesh(configuration).run(5)
     path = record(configuration, arrivals)
     listed = re.findall(r"`(/[a-z_/<>]+)`", (root / "docs" / "recording.md").read_text())
     patterns = [re.compile(re.sub("<[a-z]+>", "[^/]+", entry)) for entry in listed]
@@ -435,7 +435,7 @@ def test_every_entity_is_documented(configuration: Configuration, root: Path, re
 @pytest.mark.parametrize(("states", "filters"), [(1, 1), (2, 12), (12, 2)])
 def test_any_number_of_states_and_filters(states: int, filters: int, tmp_path: Path, record: Record) -> None:
     configuration = written(tmp_path, states, filters)
-    arrivals = MadeUpMesh(configuration).run(12)
+    arrivals = SyntheticMesh(configuration).run(12)
     path = record(configuration, arrivals)
     assert len(read_raw(path)) == len(arrivals)
     assert drawn(path, "/space/sets/f1", "Mesh3D:vertex_positions")
@@ -448,6 +448,6 @@ def test_odd_names_of_states_do_not_collide(tmp_path: Path, record: Record) -> N
     from lsu_mesh.mesh.config import load
 
     odd = load(configuration.path)
-    path = record(odd, MadeUpMesh(odd).run(5))
+    path = record(odd, SyntheticMesh(odd).run(5))
     entities = {chunk.entity_path for chunk in RrdReader(path).stream() if chunk.entity_path.startswith("/truth/")}
     assert len(entities) == 3

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lsu_mesh_services.recording.set_geometry import Body, body, hull_body, project, rectangle
+from lsu_mesh_services.recording.set_geometry import SetGeometry, body, hull_body, project, rectangle
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
@@ -24,12 +24,12 @@ from lsu_mesh.supports.zonotope import Zonotope
 CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
 
-def corners(drawn: Body) -> set[tuple[float, ...]]:
+def corners(drawn: SetGeometry) -> set[tuple[float, ...]]:
     """Distinct corners of the triangles."""
     return {tuple(point) for point in np.round(drawn.triangles.reshape(-1, 3), 9) + 0.0}
 
 
-def enclosed_volume(drawn: Body) -> float:
+def enclosed_volume(drawn: SetGeometry) -> float:
     """Volume by the divergence theorem: right only if all triangles are there and wound outward."""
     a, b, c = np.moveaxis(drawn.triangles, 1, 0)
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)

@@ -13,7 +13,7 @@ from headless_viewer import HeadlessViewer, free_port, why_not
 from lsu_mesh_services.recording.palette import TRUTH, colors
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.synthetic_mesh import START_NS, STEP_NS, MadeUpMesh, written
+from lsu_mesh_services.recording.synthetic_mesh import START_NS, STEP_NS, SyntheticMesh, written
 from pixels import Area, pixels
 
 from lsu_mesh.mesh.config import Configuration
@@ -36,7 +36,7 @@ def viewer() -> Iterator[HeadlessViewer]:
 
 def recorded(configuration: Configuration, path: Path, steps: int = 160) -> Path:
     """A run in which a filter dies and an event is told."""
-    mesh, recorder = MadeUpMesh(configuration), Recorder(configuration, path)
+    mesh, recorder = SyntheticMesh(configuration), Recorder(configuration, path)
     for role, name in configuration.peers():
         recorder.peer_changed(role, name, True, START_NS)
     arrivals = mesh.run(steps)
@@ -99,7 +99,7 @@ def pictures(viewer: HeadlessViewer, tabs: list[str], folder: Path) -> dict[str,
 def test_a_viewer_that_follows_and_freezes_disturbs_nothing(viewer: HeadlessViewer, tmp_path: Path) -> None:
     configuration = written(tmp_path, 2, 2)
     port = free_port()
-    recorder, mesh = Recorder(configuration, tmp_path / "live.rrd", serve_port=port), MadeUpMesh(configuration)
+    recorder, mesh = Recorder(configuration, tmp_path / "live.rrd", serve_port=port), SyntheticMesh(configuration)
 
     def go_on(steps: range) -> float:
         """The longest time that a step took."""
