@@ -173,6 +173,8 @@ class Input(Message, frozen=True, kw_only=True):
 
     topic = "input"
     u: Numbers
+    time_ns: Count | None = None
+    """When it began to act, nanoseconds since 1970; nil: at the moment of its step."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -185,10 +187,21 @@ class Measurement(Message, frozen=True, kw_only=True):
     topic = "measurement"
     y: Annotated[list[float | None], Meta(max_length=4096)]
     time_ns: Count
+    time_error_ns: Count | None = None
+    """Half-width of what is not known of ``time_ns``; nil (an older peer) in a message with a step: measured at that
+    step's own time, and ``time_ns`` is not read."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
         _check_finite("y", [value for value in self.y if value is not None])
+
+
+Base = Reference | Literal["prior", "reach", "domain", "sources"]
+"""What a set was made from: a message, the prior, the prior carried through all inputs, the domain, ``used`` alone."""
+Used = Annotated[list[Reference], Meta(max_length=4096)]
+"""Every message brought to a set since its base, in the order applied."""
+Names = Annotated[list[Text], Meta(max_length=4096)]
+PointRule = Literal["mean", "nearest", "centre"]
 
 
 class Prediction(Message, frozen=True, kw_only=True):
@@ -204,6 +217,15 @@ class Prediction(Message, frozen=True, kw_only=True):
     epoch: Count
     guarantee: Guarantee
     descent: Descent = []
+    base: Base | None = None
+    """The posterior of the step before that it was made from; nil: an older peer does not say."""
+    used: Used = []
+    """What was brought to ``base`` since: the input of the step before, where it was known."""
+    bounds: Bounds | None = None
+    missing: Names = []
+    """What was not known: ``["input"]`` where the input box stood in for the input."""
+    algorithm: Count | None = None
+    """Number of the arithmetic of its filter; nil is 1."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -228,14 +250,20 @@ class Posterior(Message, frozen=True, kw_only=True):
     revision: Count
     epoch: Count
     guarantee: Guarantee
-    base: Reference | Literal["prior", "reach", "domain", "sources"]
-    used: Annotated[list[Reference], Meta(max_length=4096)]
+    base: Base
+    used: Used
     bounds: Bounds
-    missing: Annotated[list[Text], Meta(max_length=4096)]
+    missing: Names
     cause: Text | None = None
     descent: Descent = []
     gain: float | None = None
     """Gain of the step's Bayesian transfers in nats; nil where none was used, or where the set became flat."""
+    gain_of: Literal["support", "hull"] | None = None
+    """Whose volumes ``gain`` compares; nil: an older peer does not say."""
+    point_rule: PointRule | None = None
+    """How ``point`` was chosen; nil: the centre of the hull, as older peers do."""
+    algorithm: Count | None = None
+    """Number of the arithmetic of its kind or policy, raised whenever its bits change; nil is 1."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -298,6 +326,10 @@ class Health(Message, frozen=True, kw_only=True):
     level: Literal["OK", "WARN", "ERROR", "STALE"]
     reasons: Annotated[list[Text], Meta(max_length=256)]
     counters: Annotated[dict[Text, float], Meta(max_length=4096)]
+    started_ns: Count | None = None
+    """When the process started, nanoseconds since 1970."""
+    host: Text | None = None
+    """Name of the machine that it runs on."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
