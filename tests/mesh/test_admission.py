@@ -1,4 +1,4 @@
-"""The gate: new, known and sound messages pass once."""
+"""Admission: new, known and sound messages are let in once."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def configuration(demo: Path) -> Configuration:
 
 
 @pytest.fixture
-def gate(configuration: Configuration) -> Admission:
+def admission(configuration: Configuration) -> Admission:
     return Admission(configuration, ["measurement"])
 
 
@@ -34,16 +34,16 @@ def payload(configuration: Configuration, **changes: Any) -> bytes:
     return encode(Measurement(**(content | changes)))
 
 
-def test_a_copy_is_counted_and_not_passed_on(gate: Admission, configuration: Configuration) -> None:
+def test_a_copy_is_counted_and_not_passed_on(admission: Admission, configuration: Configuration) -> None:
     message = payload(configuration)
-    assert gate.admit(KEY, message) is not None
-    assert gate.admit(KEY, message) is None
-    assert gate.counters == {"received": 1, "duplicates": 1, "gaps": 0}
+    assert admission.admit(KEY, message) is not None
+    assert admission.admit(KEY, message) is None
+    assert admission.counters == {"received": 1, "duplicates": 1, "gaps": 0}
 
 
-def test_another_boot_starts_its_own_sequence(gate: Admission, configuration: Configuration) -> None:
-    assert gate.admit(KEY, payload(configuration)) is not None
-    assert gate.admit(KEY, payload(configuration, boot="1" * 16)) is not None
+def test_another_boot_starts_its_own_sequence(admission: Admission, configuration: Configuration) -> None:
+    assert admission.admit(KEY, payload(configuration)) is not None
+    assert admission.admit(KEY, payload(configuration, boot="1" * 16)) is not None
 
 
 @pytest.mark.parametrize(
@@ -61,11 +61,11 @@ def test_another_boot_starts_its_own_sequence(gate: Admission, configuration: Co
     ],
 )
 def test_what_does_not_belong_here_is_refused_by_reason(
-    gate: Admission, configuration: Configuration, key: str, changes: dict[str, Any], reason: str
+    admission: Admission, configuration: Configuration, key: str, changes: dict[str, Any], reason: str
 ) -> None:
-    assert gate.admit(key, payload(configuration, **changes)) is None
-    assert gate.refused == {reason: 1}
-    assert reason in gate.last_refusal
+    assert admission.admit(key, payload(configuration, **changes)) is None
+    assert admission.refused == {reason: 1}
+    assert reason in admission.last_refusal
 
 
 @given(st.permutations(range(30)), st.lists(st.integers(0, 29), max_size=10))

@@ -38,7 +38,7 @@ def _tell(configuration: Configuration, options: argparse.Namespace) -> int:
 
 def _listen(configuration: Configuration, options: argparse.Namespace) -> list[PeerHealth]:
     """Heartbeats and liveliness of so many seconds, judged at their end."""
-    clock, gate, mesh = Clock(), Admission(configuration, ("health",)), configuration.mesh.name
+    clock, admission, mesh = Clock(), Admission(configuration, ("health",)), configuration.mesh.name
     observer = HealthObserver(configuration, clock.now())
     with Bus(session_settings(configuration, options), clock) as bus:
         bus.subscribe(f"{PREFIX}/{mesh}/health/*")
@@ -47,18 +47,18 @@ def _listen(configuration: Configuration, options: argparse.Namespace) -> list[P
         while (left := end - clock.now()) > 0:
             arrival = bus.next(left / SECOND)
             if arrival is not None:
-                record(observer, gate, arrival)
+                record(observer, admission, arrival)
         return observer.peers(clock.now())
 
 
-def record(observer: HealthObserver, gate: Admission, arrival: Arrival) -> None:
+def record(observer: HealthObserver, admission: Admission, arrival: Arrival) -> None:
     """Tell the observer what has come."""
     if arrival.what != "sample":
         address = parse(arrival.key)
         if address is not None:
             observer.record_presence(address.name, arrival.what == "alive")
         return
-    message = gate.admit(arrival.key, arrival.payload)
+    message = admission.admit(arrival.key, arrival.payload)
     if isinstance(message, Health):
         observer.record(message, arrival.arrival_ns)
 

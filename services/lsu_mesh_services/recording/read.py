@@ -65,15 +65,15 @@ def read_recording(path: Path) -> Recording:
     files = parts(path)
     description = read_description(files[0])
     configuration = recorded_configuration(path, description)
-    gate = Admission(configuration, TYPES)
+    admission = Admission(configuration, TYPES)
     received, damaged = [], []
     for raw in read_raw(*files):
-        duplicates = gate.duplicates
-        message = gate.admit(raw.key, raw.payload)
+        duplicates = admission.duplicates
+        message = admission.admit(raw.key, raw.payload)
         if message is not None:
             received.append(Received(raw.arrival_ns, raw.key, raw.payload, message))
-        elif gate.duplicates == duplicates:
-            damaged.append(gate.last_refusal)
+        elif admission.duplicates == duplicates:
+            damaged.append(admission.last_refusal)
     return Recording(files, description, configuration, received, damaged)
 
 
