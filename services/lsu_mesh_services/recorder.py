@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import secrets
+import socket
 import sys
 import time
 from pathlib import Path
@@ -85,6 +86,7 @@ class RecorderService:
         self._admission = Admission(configuration, TYPES)
         self._recovery = GapRecovery(self._admission, bus.ask_cache)
         self._boot = secrets.token_hex(8)
+        self._started_ns, self._host = clock.now(), socket.gethostname()
         self._sequence = 0
         self._next_health = 0
         self._links = -1
@@ -165,6 +167,7 @@ class RecorderService:
             v=VERSION, src=f"{ROLE_NAME}/{ROLE_NAME}", boot=self._boot, seq=self._sequence, step=0, sent_ns=now,
             origin_ns=now, model=self._configuration.digest(), role=ROLE_NAME,
             level="WARN" if problems else "OK", reasons=problems[:16], counters=counters,
+            started_ns=self._started_ns, host=self._host,
         )  # fmt: skip
         self._sequence += 1
         self._bus.publish(key(self._mesh, "health", ROLE_NAME), encode(health), encoding("health"))

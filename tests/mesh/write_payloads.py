@@ -1,4 +1,4 @@
-"""Payloads of every topic and kind of set, kept when a version is released: ``python tests/mesh/write_payloads.py FILE``.
+"""Payloads of every topic and kind of set, to keep of a version: ``python tests/mesh/write_payloads.py FILE``.
 
 Each line of the file says what the payload is, its topic, its fields in JSON, and its bytes in hexadecimal digits.
 Files that are released are never written again: they show what others have on their disks and send.
@@ -33,7 +33,8 @@ SETS: dict[str, Fields] = {
 }  # fmt: skip
 REFERENCES = [["input", "plant/plant", "0011223344556677", 40], ["measurement", "sensor/s1", "8899aabbccddeeff", 2**62]]
 ESTIMATE: Fields = {
-    "lower": LOWER, "upper": UPPER, "epoch": 3, "guarantee": "learned", "descent": [["filter/cz", "89abcdef01234567", 1]],
+    "lower": LOWER, "upper": UPPER, "epoch": 3, "guarantee": "learned",
+    "descent": [["filter/cz", "89abcdef01234567", 1]],
     "base": ["posterior", "filter/box", "0123456789abcdef", 40], "used": REFERENCES, "missing": ["s2"],
     "bounds": {"rho": [0.1, 0.0], "r": [0.3]}, "algorithm": 2,
 }  # fmt: skip

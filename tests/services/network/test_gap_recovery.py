@@ -68,7 +68,9 @@ def test_a_gap_that_closes_is_asked_for_no_more(admission: Admission, configurat
     assert (admission.gaps, admission.gaps_by_key()) == (0, {})
 
 
-def test_a_peer_that_has_more_than_enough_to_do_asks_less_often_and_while_publishers_remember(admission: Admission) -> None:
+def test_a_peer_that_has_more_than_enough_to_do_asks_less_often_and_while_publishers_remember(
+    admission: Admission,
+) -> None:
     asked: list[int] = []
     second = 0
     recovery = GapRecovery(admission, lambda _: asked.append(second))
