@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -80,12 +81,17 @@ def newer(message: Message, payload: bytes) -> bytes:
     return msgpack.packb(fields)
 
 
+@functools.cache
+def first_fields() -> dict[str, set[str]]:
+    """The fields of each topic in the first release."""
+    first = Path(__file__).parents[2] / "mesh" / "data" / "payloads-0.1" / "first.jsonl"
+    return {line["topic"]: set(line["fields"]) for line in map(json.loads, first.read_text().splitlines())}
+
+
 def older(message: Message, payload: bytes) -> bytes:
     """What a peer of the first release sends."""
-    first = Path(__file__).parents[2] / "mesh" / "data" / "payloads-0.1" / "first.jsonl"
-    names = {line["topic"]: set(line["fields"]) for line in map(json.loads, first.read_text().splitlines())}
     return msgpack.packb(
-        {name: value for name, value in msgpack.unpackb(payload).items() if name in names[message.topic]}
+        {name: value for name, value in msgpack.unpackb(payload).items() if name in first_fields()[message.topic]}
     )
 
 
