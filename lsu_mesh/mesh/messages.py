@@ -407,10 +407,10 @@ def read(topic: str, payload: bytes) -> tuple[Message, tuple[str, ...]]:
 
 def _read_newer(topic: str, payload: bytes, refusal: msgspec.ValidationError) -> tuple[Message, tuple[str, ...]]:
     """What is known of a payload that strict decoding refuses; raises ``refusal`` where that was for another reason."""
-    version = _VERSION_DECODER.decode(payload).v
+    known, unknown = without_unknown(payload, TYPES[topic])
+    version = _VERSION_DECODER.decode(known).v
     if version != VERSION:
         raise Refused("version", f"version {version}, this peer speaks {VERSION}")
-    known, unknown = without_unknown(payload, TYPES[topic])
     if not unknown:
         raise refusal
     return _DECODERS[topic].decode(known), unknown

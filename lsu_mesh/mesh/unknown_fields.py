@@ -7,8 +7,10 @@ fields are skipped and not built: however large they are, they cost no memory.
 from __future__ import annotations
 
 import functools
+import operator
+import types
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 from msgspec import Raw, Struct, inspect
@@ -57,10 +59,27 @@ class _Shape:
 
 
 class _Place(NamedTuple):
-    """A field that holds maps, in lists of at most so many entries, in one another."""
+    """A field that holds maps, in lists of at most so many entries, in one another.
+
+    ``strict`` are decoders of what stands there, in all of the lists and then in one fewer each: most maps of a newer
+    message have nothing new, and are through at once.
+    """
 
     shape: _Shape
+    strict: tuple[msgspec.msgpack.Decoder[Any], ...]
     lists: tuple[int, ...] = ()
+
+    def is_known(self, part: Part) -> bool:
+        """Whether there is nothing unknown in it, because strict decoding takes it."""
+        try:
+            self.strict[0].decode(part)
+        except msgspec.ValidationError:
+            return False
+        return True
+
+    def entry(self) -> _Place:
+        """What stands in a list of these."""
+        return self._replace(strict=self.strict[1:], lists=self.lists[1:])
 
 
 def without_unknown(payload: bytes, kind: type[Struct]) -> tuple[bytes, tuple[str, ...]]:
@@ -76,28 +95,32 @@ def without_unknown(payload: bytes, kind: type[Struct]) -> tuple[bytes, tuple[st
         It is not MessagePack, or the name of a field is no string.
     """
     reading = _Reading()
-    known = reading.known(payload, _Place(_shape(kind)), "")
+    known = reading.known(payload, _place_of(kind), "")
     return bytes(known), tuple(reading.unknown)
 
 
 @functools.cache
-def _shape(kind: type[Struct]) -> _Shape:
-    described = inspect.type_info(kind)
-    assert isinstance(described, inspect.StructType)
-    return _Shape([described])
+def _place_of(kind: type[Struct]) -> _Place:
+    place = _place(inspect.type_info(kind))
+    assert place is not None
+    return place
 
 
 def _place(described: inspect.Type) -> _Place | None:
     """What maps a field holds; ``None`` where it holds none."""
     if isinstance(described, inspect.ListType):
-        inner, longest = _place(described.item_type), described.max_length
-        if inner is None:
+        entry, longest = _place(described.item_type), described.max_length
+        if entry is None:
             return None
         assert longest is not None, "lists of maps have a limit"
-        return inner._replace(lists=(longest, *inner.lists))
+        listed: Any = types.GenericAlias(list, (entry.strict[0].type,))
+        return _Place(entry.shape, (msgspec.msgpack.Decoder(listed), *entry.strict), (longest, *entry.lists))
     kinds = described.types if isinstance(described, inspect.UnionType) else (described,)
     structs = [one for one in kinds if isinstance(one, inspect.StructType)]
-    return _Place(_Shape(structs)) if structs else None
+    if not structs:
+        return None
+    union: Any = functools.reduce(operator.or_, (struct.cls for struct in structs))
+    return _Place(_Shape(structs), (msgspec.msgpack.Decoder(union),))
 
 
 class _Reading:
@@ -118,8 +141,11 @@ class _Reading:
             return self._known_map(part, size, place.shape, path)
         if size > place.lists[0]:
             return part
-        inner = place._replace(lists=place.lists[1:])
-        return _ENCODER.encode([Raw(self.known(item, inner, path)) for item in _LIST.decode(part)])
+        entry = place.entry()
+        return _ENCODER.encode([self._known_within(item, entry, path) for item in _LIST.decode(part)])
+
+    def _known_within(self, part: Raw, place: _Place, path: str) -> Raw:
+        return part if place.is_known(part) else Raw(self.known(part, place, path))
 
     def _known_map(self, part: Part, size: int, shape: _Shape, path: str) -> Part:
         self._surplus += max(0, size - max(map(len, shape.fields.values())) - 1)
@@ -132,7 +158,7 @@ class _Reading:
         names, within, known = shape.fields[tag], shape.within[tag], dict[str, Raw]()
         for name, value in content.items():
             if name in within:
-                known[name] = Raw(self.known(value, within[name], f"{path}{name}."))
+                known[name] = self._known_within(value, within[name], f"{path}{name}.")
             elif name in names or name == shape.tag_field:
                 known[name] = value
             else:
