@@ -68,7 +68,7 @@ def _answers(configuration: Configuration, role: str, name: str) -> tuple[str, .
     mesh = configuration.mesh.name
     if role == "fusion":
         return (model_key(mesh), *(last_key(mesh, source) for source in configuration.fusion[name].sources))
-    return (model_key(mesh),) if role == "filter" and not configuration.fusion else ()
+    return (model_key(mesh),) if role == "filter" else ()
 
 
 def _truth(configuration: Configuration) -> list[tuple[str, str]]:

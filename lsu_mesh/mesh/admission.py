@@ -1,4 +1,4 @@
-"""The gate in front of a node: only sound, known and new messages pass, everything else is counted by reason."""
+"""Admission to a node: only sound, known and new messages are let in, everything else is counted by reason."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lsu_mesh.mesh.messages import (
     Suggestion,
     SupportMessage,
     Truth,
-    decode,
+    read,
 )
 
 ROLE_OF_TOPIC = {
@@ -37,6 +37,8 @@ WINDOW = 4096
 """How far back in a sequence a message may come late and still be told from a copy."""
 MAX_BOOTS = 16
 UNLIMITED = 4096
+MAX_NAMES = 64
+"""So many unknown fields are counted by name; whoever sends more of them is counted without."""
 
 
 class Sequence:
@@ -72,7 +74,8 @@ class Sequence:
 class Admission:
     """Decodes payloads and lets through what this mesh's configuration says may come.
 
-    ``counters`` holds ``received``, ``duplicates``, ``gaps`` and ``refused.<reason>``.
+    ``counters`` holds ``received``, ``duplicates``, ``gaps`` and ``refused.<reason>``; where a newer peer sends fields
+    that are unknown here, also ``unknown fields``, the messages that had some, and ``unknown fields.<topic>.<field>``.
     """
 
     def __init__(self, configuration: Configuration, topics: Collection[str]) -> None:
@@ -98,13 +101,17 @@ class Admission:
         self.duplicates = 0
         self.refused: Counter[str] = Counter()
         self.last_refusal = ""
-        self.decoder: Callable[[str, bytes], Message] = decode
+        self.with_unknown_fields = 0
+        """Messages let in without fields that are unknown here."""
+        self.unknown_fields: Counter[str] = Counter()
+        """By topic and field, such as ``posterior.support.colour``."""
+        self.decoder: Callable[[str, bytes], tuple[Message, tuple[str, ...]]] = read
         """What makes messages of payloads; many receivers in one process may share one with a memory."""
 
     def admit(self, key: str, payload: bytes) -> Message | None:
         """The message, or ``None`` when it is refused or a copy."""
         try:
-            message = self._checked(key, payload)
+            message, unknown = self._checked(key, payload)
         except Refused as refusal:
             self.refused[refusal.reason] += 1
             self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
@@ -113,6 +120,8 @@ class Admission:
             self.duplicates += 1
             return None
         self.received += 1
+        if unknown:
+            self._count_unknown(message.topic, unknown)
         return message
 
     @property
@@ -137,13 +146,22 @@ class Admission:
             "gaps": self.gaps,
         }
         counts |= {f"refused.{reason}": count for reason, count in sorted(self.refused.items())}
+        if self.with_unknown_fields:
+            counts["unknown fields"] = self.with_unknown_fields
+            counts |= {f"unknown fields.{name}": count for name, count in sorted(self.unknown_fields.items())}
         return counts
 
-    def _checked(self, key: str, payload: bytes) -> Message:
+    def _count_unknown(self, topic: str, fields: tuple[str, ...]) -> None:
+        self.with_unknown_fields += 1
+        for name in (f"{topic}.{field}" for field in fields):
+            if name in self.unknown_fields or len(self.unknown_fields) < MAX_NAMES:
+                self.unknown_fields[name] += 1
+
+    def _checked(self, key: str, payload: bytes) -> tuple[Message, tuple[str, ...]]:
         address = parse(key)
         if address is None or address.mesh != self._mesh or address.topic not in self._topics:
             raise Refused("key", "not a key that this peer listens to")
-        message = self.decoder(address.topic, payload)
+        message, unknown = self.decoder(address.topic, payload)
         role = ROLE_OF_TOPIC.get(address.topic, message.src.partition("/")[0])
         if message.src != f"{role}/{address.name}":
             raise Refused("source", f"src is {message.src!r}, the key belongs to {role}/{address.name}")
@@ -152,7 +170,7 @@ class Admission:
         if message.model != self._digest:
             raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
         self._check_shape(address.name, message)
-        return message
+        return message, unknown
 
     def _check_shape(self, name: str, message: Message) -> None:
         if isinstance(message, Truth):

@@ -25,14 +25,25 @@ def example(topic: str) -> Message:
             ("input", "plant/plant", "0011223344556677", 40),
             ("measurement", "sensor/s1", "8899aabbccddeeff", 41),
         ],
-        "bounds": Bounds(rho=[0.1, 0.1], r=[0.3]), "missing": ["s2"],
+        "bounds": Bounds(rho=[0.1, 0.1], r=[0.3]), "missing": ["s2"], "point_rule": "mean", "algorithm": 1,
     }  # fmt: skip
     own: dict[str, dict[str, Any]] = {
         "truth": {"x": [0.1, 0.8]},
-        "input": {"u": [0.4]},
-        "measurement": {"y": [0.7, None], "time_ns": 840_000_000},
+        "input": {"u": [0.4], "time_ns": 1_700_000_000_000_000_000},
+        "measurement": {"y": [0.7, None], "time_ns": 1_700_000_000_017_500_000, "time_error_ns": 500_000},
         "prediction": bounds
-        | {"support": box, "y_lower": [-0.3], "y_upper": [1.1], "y_point": [0.4], "epoch": 0, "guarantee": "declared"},
+        | {
+            "support": box,
+            "y_lower": [-0.3],
+            "y_upper": [1.1],
+            "y_point": [0.4],
+            "epoch": 0,
+            "guarantee": "declared",
+            "base": ("posterior", "filter/box", "0123456789abcdef", 40),
+            "used": [("input", "plant/plant", "0011223344556677", 40)],
+            "bounds": Bounds(rho=[0.1, 0.1], r=[0.3]),
+            "algorithm": 1,
+        },
         "posterior": estimate,
         "fused": estimate
         | {
@@ -51,7 +62,14 @@ def example(topic: str) -> Message:
             "explained": False,
             "adopt_at": 62,
         },
-        "health": {"role": "filter", "level": "OK", "reasons": [], "counters": {"received": 84.0, "gaps": 0.0}},
+        "health": {
+            "role": "filter",
+            "level": "OK",
+            "reasons": [],
+            "counters": {"received": 84.0, "gaps": 0.0},
+            "started_ns": 1_699_999_999_000_000_000,
+            "host": "lab-1",
+        },
         "event": {
             "level": "WARN",
             "code": "contradiction",

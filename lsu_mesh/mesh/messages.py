@@ -1,7 +1,8 @@
 """The messages of the mesh: MessagePack maps, typed with msgspec, decoded strictly.
 
 Every message carries the common fields of :class:`Message`. Matrices are lists of rows. Nothing that is not finite,
-ordered and of one dimension gets past :func:`decode`.
+ordered and of one dimension gets past :func:`decode`. Fields that are unknown here are ignored, and :func:`read` names
+them. Fields that came later than the first release have a default, so that older payloads are read for ever.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 from msgspec import Meta, Struct
+
+from lsu_mesh.mesh.unknown_fields import TooManyFields, without_unknown
 
 VERSION = 1
 MAX_PAYLOAD = 1 << 20
@@ -45,6 +48,12 @@ class Refused(Exception):
 
 class _Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     pass
+
+
+class _Version(Struct):
+    """What every version of every message has."""
+
+    v: int
 
 
 class OrthotopeMessage(_Strict, frozen=True, kw_only=True, tag_field="type", tag="orthotope"):
@@ -356,6 +365,7 @@ TYPES: dict[str, type[Message]] = {
 _DECODERS: dict[str, msgspec.msgpack.Decoder[Any]] = {
     topic: msgspec.msgpack.Decoder(kind, strict=True) for topic, kind in TYPES.items()
 }
+_VERSION_DECODER = msgspec.msgpack.Decoder(_Version)
 _ENCODER = msgspec.msgpack.Encoder()
 
 
@@ -371,18 +381,39 @@ def encode(message: Message) -> bytes:
 
 def decode(topic: str, payload: bytes) -> Message:
     """The message in ``payload``; raises :class:`Refused` and nothing else."""
+    return read(topic, payload)[0]
+
+
+def read(topic: str, payload: bytes) -> tuple[Message, tuple[str, ...]]:
+    """The message in ``payload``, and the names of the fields in it that are unknown here and were ignored.
+
+    Raises :class:`Refused` and nothing else.
+    """
     decoder = _DECODERS.get(topic)
     if decoder is None:
         raise Refused("topic", f"no message type for topic {topic!r}")
     if len(payload) > MAX_PAYLOAD:
         raise Refused("size", f"{len(payload)} bytes, the limit is {MAX_PAYLOAD}")
     try:
-        message: Message = decoder.decode(payload)
-    except msgspec.ValidationError as error:
-        raise Refused("version" if str(error).startswith("version") else "content", str(error)) from None
+        try:
+            return decoder.decode(payload), ()
+        except msgspec.ValidationError as refusal:
+            return _read_newer(topic, payload, refusal)
+    except (msgspec.ValidationError, TooManyFields) as error:
+        raise Refused("content", str(error)) from None
     except (msgspec.DecodeError, RecursionError, UnicodeDecodeError, OverflowError, MemoryError) as error:
         raise Refused("format", f"{type(error).__name__}: {error}") from None
-    return message
+
+
+def _read_newer(topic: str, payload: bytes, refusal: msgspec.ValidationError) -> tuple[Message, tuple[str, ...]]:
+    """What is known of a payload that strict decoding refuses; raises ``refusal`` where that was for another reason."""
+    known, unknown = without_unknown(payload, TYPES[topic])
+    version = _VERSION_DECODER.decode(known).v
+    if version != VERSION:
+        raise Refused("version", f"version {version}, this peer speaks {VERSION}")
+    if not unknown:
+        raise refusal
+    return _DECODERS[topic].decode(known), unknown
 
 
 def dimension(support: SupportMessage) -> int:

@@ -33,6 +33,10 @@ class PeerHealth:
     age_ns: int | None = None
     """Since the last heartbeat; None where none ever came."""
     counters: Mapping[str, float] = field(default_factory=dict)
+    started_ns: int | None = None
+    """When its process started, by its own clock; None where it does not say."""
+    host: str | None = None
+    """Machine that it runs on; None where it does not say."""
 
 
 @dataclass
@@ -98,7 +102,17 @@ class HealthObserver:
             level, reasons = "STALE", ("left the mesh", *reasons)
         elif age >= STALE_NS:
             level, reasons = "STALE", (f"no heartbeat for {age / SECOND:.1f} s", *reasons)
-        return PeerHealth(name, message.role, level, reasons, message.step, age, message.counters)
+        return PeerHealth(
+            name,
+            message.role,
+            level,
+            reasons,
+            step=message.step,
+            age_ns=age,
+            counters=message.counters,
+            started_ns=message.started_ns,
+            host=message.host,
+        )
 
 
 def worst(levels: Sequence[Level]) -> Level:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import gc
+import socket
 import sys
 from collections.abc import Iterable
 
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Message, encode, encoding
+from lsu_mesh.mesh.model_answer import encode_model, model_answer
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
@@ -25,6 +27,7 @@ MAX_WAIT = 0.1
 def run_node(node: Node, settings: SessionSettings, stop: Stop) -> int:
     """Run a node until it is told to stop; returns the exit code."""
     clock = Clock()
+    node.started_ns, node.host = clock.now(), socket.gethostname()
     node.warm_up()
     gc.collect()
     gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
@@ -92,9 +95,8 @@ class Peer:
             return None if last is None else (own_key, encode(last), encoding(last.topic))
 
         self._bus.answer(own_key, latest)
-        if topic == "fused" or not node.configuration.fusion:
-            payload = encode_model(node)
-            self._bus.answer(model_key(self._mesh), lambda: (model_key(self._mesh), payload, "application/msgpack"))
+        model, asked = encode_model(model_answer(node.configuration)), model_key(self._mesh)
+        self._bus.answer(asked, lambda: (asked, model, "application/msgpack"))
 
     def turn(self) -> None:
         """Wait for something to do, then do all of it."""
@@ -165,27 +167,3 @@ class Peer:
     def _publish(self, messages: Iterable[Message]) -> None:
         for message in messages:
             self._bus.publish(self._node.key(message), encode(message), encoding(message.topic))
-
-
-def encode_model(node: Node) -> bytes:
-    """The model as a MessagePack map: A, B, C by sensor, rho, r by sensor, noise_map, names, dt, digest."""
-    import msgspec
-
-    configuration = node.configuration
-    model = configuration.base_model
-    content = {
-        "v": 1,
-        "model": configuration.digest(),
-        "dt": configuration.mesh.dt,
-        "A": model.A.tolist(),
-        "B": None if model.B is None else model.B.tolist(),
-        "noise_map": None if model.noise_map is None else model.noise_map.tolist(),
-        "rho": model.rho.tolist(),
-        "states": list(model.states),
-        "units": list(model.units),
-        "sensors": {
-            name: {"C": [list(row) for row in sensor.C], "r": list(sensor.r), "outputs": list(sensor.outputs)}
-            for name, sensor in configuration.sensors.items()
-        },
-    }
-    return msgspec.msgpack.encode(content)

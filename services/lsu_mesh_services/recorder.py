@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import secrets
+import socket
 import sys
 import time
 from pathlib import Path
@@ -82,9 +83,10 @@ class RecorderService:
         self._bus = bus
         self._clock = clock
         self._mesh = configuration.mesh.name
-        self._gate = Admission(configuration, TYPES)
-        self._recovery = GapRecovery(self._gate, bus.ask_cache)
+        self._admission = Admission(configuration, TYPES)
+        self._recovery = GapRecovery(self._admission, bus.ask_cache)
         self._boot = secrets.token_hex(8)
+        self._started_ns, self._host = clock.now(), socket.gethostname()
         self._sequence = 0
         self._next_health = 0
         self._links = -1
@@ -140,9 +142,9 @@ class RecorderService:
 
     def _take(self, arrival: Arrival) -> None:
         if arrival.what == "sample":
-            duplicates = self._gate.duplicates
-            message = self._gate.admit(arrival.key, arrival.payload)
-            if message is not None or self._gate.duplicates == duplicates:
+            duplicates = self._admission.duplicates
+            message = self._admission.admit(arrival.key, arrival.payload)
+            if message is not None or self._admission.duplicates == duplicates:
                 self._recorder.record(arrival.key, arrival.payload, arrival.arrival_ns, message)
             if isinstance(message, Health) and message.name != ROLE_NAME:
                 self._source_timeouts.received(message.name, arrival.arrival_ns)
@@ -157,7 +159,7 @@ class RecorderService:
         problems += [complaint.text for complaint in self._source_timeouts.complaints(now)]
         if self._bus.dropped:
             problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
-        counters = self._gate.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}
+        counters = self._admission.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}
         counters |= {"links": float(self._links), "step_ms": self._longest_ns * 1e-6}
         self._queue = self._longest_ns = 0
         counters |= {f"flushed {flushed}": float(seq) for flushed, seq in self._recorder.flushed.items()}
@@ -165,6 +167,7 @@ class RecorderService:
             v=VERSION, src=f"{ROLE_NAME}/{ROLE_NAME}", boot=self._boot, seq=self._sequence, step=0, sent_ns=now,
             origin_ns=now, model=self._configuration.digest(), role=ROLE_NAME,
             level="WARN" if problems else "OK", reasons=problems[:16], counters=counters,
+            started_ns=self._started_ns, host=self._host,
         )  # fmt: skip
         self._sequence += 1
         self._bus.publish(key(self._mesh, "health", ROLE_NAME), encode(health), encoding("health"))

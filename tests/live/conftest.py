@@ -67,7 +67,7 @@ def start(lsu_mesh_command: list[str], root: Path, tmp_path: Path) -> Iterator[S
     def begin(*arguments: str, endpoint: str = "") -> Session:
         endpoint = endpoint or f"tcp/127.0.0.1:{free_port()}"
         command = [*lsu_mesh_command, *(argument.replace("{endpoint}", endpoint) for argument in arguments)]
-        environment = {**os.environ, "PYTHONPATH": str(root)}
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(root / "services")])}
         process = subprocess.Popen(
             command, cwd=tmp_path, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )

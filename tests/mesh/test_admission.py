@@ -1,17 +1,18 @@
-"""The gate: new, known and sound messages pass once."""
+"""Admission: new, known and sound messages are let in once."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+import msgpack
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lsu_mesh.mesh.admission import Admission, Sequence
+from lsu_mesh.mesh.admission import MAX_NAMES, Admission, Sequence
 from lsu_mesh.mesh.config import Configuration, load
-from lsu_mesh.mesh.messages import Measurement, encode
+from lsu_mesh.mesh.messages import Measurement, decode, encode
 
 KEY = "lsu/v1/demo/measurement/s1"
 
@@ -22,7 +23,7 @@ def configuration(demo: Path) -> Configuration:
 
 
 @pytest.fixture
-def gate(configuration: Configuration) -> Admission:
+def admission(configuration: Configuration) -> Admission:
     return Admission(configuration, ["measurement"])
 
 
@@ -34,16 +35,16 @@ def payload(configuration: Configuration, **changes: Any) -> bytes:
     return encode(Measurement(**(content | changes)))
 
 
-def test_a_copy_is_counted_and_not_passed_on(gate: Admission, configuration: Configuration) -> None:
+def test_a_copy_is_counted_and_not_passed_on(admission: Admission, configuration: Configuration) -> None:
     message = payload(configuration)
-    assert gate.admit(KEY, message) is not None
-    assert gate.admit(KEY, message) is None
-    assert gate.counters == {"received": 1, "duplicates": 1, "gaps": 0}
+    assert admission.admit(KEY, message) is not None
+    assert admission.admit(KEY, message) is None
+    assert admission.counters == {"received": 1, "duplicates": 1, "gaps": 0}
 
 
-def test_another_boot_starts_its_own_sequence(gate: Admission, configuration: Configuration) -> None:
-    assert gate.admit(KEY, payload(configuration)) is not None
-    assert gate.admit(KEY, payload(configuration, boot="1" * 16)) is not None
+def test_another_boot_starts_its_own_sequence(admission: Admission, configuration: Configuration) -> None:
+    assert admission.admit(KEY, payload(configuration)) is not None
+    assert admission.admit(KEY, payload(configuration, boot="1" * 16)) is not None
 
 
 @pytest.mark.parametrize(
@@ -61,11 +62,11 @@ def test_another_boot_starts_its_own_sequence(gate: Admission, configuration: Co
     ],
 )
 def test_what_does_not_belong_here_is_refused_by_reason(
-    gate: Admission, configuration: Configuration, key: str, changes: dict[str, Any], reason: str
+    admission: Admission, configuration: Configuration, key: str, changes: dict[str, Any], reason: str
 ) -> None:
-    assert gate.admit(key, payload(configuration, **changes)) is None
-    assert gate.refused == {reason: 1}
-    assert reason in gate.last_refusal
+    assert admission.admit(key, payload(configuration, **changes)) is None
+    assert admission.refused == {reason: 1}
+    assert reason in admission.last_refusal
 
 
 @given(st.permutations(range(30)), st.lists(st.integers(0, 29), max_size=10))
@@ -92,3 +93,45 @@ def test_memory_stays_bounded_whatever_numbers_come() -> None:
     for seq in range(0, 2**40, 2**30):
         sequence.admit(seq)
     assert sequence.gaps <= 3 * 4096
+
+
+def newer(configuration: Configuration, *fields: str, **changes: Any) -> bytes:
+    """A payload with further fields."""
+    return msgpack.packb(msgpack.unpackb(payload(configuration, **changes)) | dict.fromkeys(fields, 1))
+
+
+def test_a_message_with_unknown_fields_counts_once_and_each_field_by_name(
+    admission: Admission, configuration: Configuration
+) -> None:
+    assert admission.admit(KEY, newer(configuration, "colour", "shade")) is not None
+    assert admission.admit(KEY, newer(configuration, "colour", seq=1)) is not None
+    assert admission.admit(KEY, newer(configuration, "colour", seq=1)) is None, "a copy"
+    assert admission.admit(KEY, newer(configuration, "colour", seq=2, src="sensor/s2")) is None, "not the owner"
+    assert admission.admit(KEY, payload(configuration, seq=3)) is not None
+    assert admission.counters == {
+        "received": 3, "duplicates": 1, "gaps": 1, "refused.source": 1, "unknown fields": 2,
+        "unknown fields.measurement.colour": 2, "unknown fields.measurement.shade": 1,
+    }  # fmt: skip
+
+
+def test_names_of_unknown_fields_do_not_fill_the_memory(admission: Admission, configuration: Configuration) -> None:
+    for seq in range(3 * MAX_NAMES):
+        assert admission.admit(KEY, newer(configuration, f"field {seq}", seq=seq)) is not None
+    assert admission.with_unknown_fields == 3 * MAX_NAMES
+    assert len(admission.unknown_fields) == MAX_NAMES
+
+
+def test_a_measurement_without_a_step_is_a_message_and_is_not_admitted_yet(
+    admission: Admission, configuration: Configuration
+) -> None:
+    timed = payload(configuration, step=0, time_ns=7, time_error_ns=0)
+    message = decode("measurement", timed)
+    assert isinstance(message, Measurement)
+    assert (message.step, message.time_error_ns) == (0, 0)
+    assert admission.admit(KEY, timed) is None
+    assert admission.refused == {"step": 1}
+
+
+def test_several_measurements_of_one_step_are_admitted(admission: Admission, configuration: Configuration) -> None:
+    assert admission.admit(KEY, payload(configuration, seq=0, step=5)) is not None
+    assert admission.admit(KEY, payload(configuration, seq=1, step=5, y=[None])) is not None

@@ -7,10 +7,12 @@ import re
 from pathlib import Path
 
 import msgpack
+import msgspec
 import pytest
 
 from lsu_mesh.mesh.message_examples import example
 from lsu_mesh.mesh.messages import TYPES, Message, decode, encode
+from lsu_mesh.mesh.model_answer import ModelAnswer
 
 
 @pytest.fixture(scope="module")
@@ -18,11 +20,27 @@ def page(root: Path) -> str:
     return (root / "docs" / "protocol.md").read_text()
 
 
+def rows(page: str, heading: str) -> list[tuple[set[str], str]]:
+    """Fields and type of each row in the tables below a heading."""
+    section = page.split(f"# {heading}\n")[1].split("\n#")[0]
+    cells = [row.split("|")[1:3] for row in section.splitlines() if row.startswith("| `")]
+    return [(set(re.findall(r"`(\w+)`", names)), kind.strip()) for names, kind in cells]
+
+
 def documented(page: str, heading: str) -> set[str]:
     """Fields in the tables below a heading."""
-    section = page.split(f"### {heading}\n")[1].split("\n#")[0]
-    cells = [row.split("|")[1] for row in section.splitlines() if row.startswith("| `")]
-    return {field for cell in cells for field in re.findall(r"`(\w+)`", cell)}
+    return {field for names, _ in rows(page, heading) for field in names}
+
+
+def defaults(topic: str) -> dict[str, str]:
+    """Fields that may be missing, and what a reader takes for them, as the page writes it."""
+    fields = msgspec.structs.fields(TYPES[topic])
+    written = {
+        field.name: field.default if field.default_factory is msgspec.NODEFAULT else field.default_factory()
+        for field in fields
+        if not field.required
+    }
+    return {name: "nil" if value is None else repr(value) for name, value in written.items()}
 
 
 @pytest.mark.parametrize("topic", sorted(TYPES))
@@ -34,6 +52,17 @@ def test_the_page_lists_exactly_the_fields_of_a_topic(page: str, topic: str) -> 
         listed |= documented(page, "`posterior`")
     assert listed == fields - common
     assert documented(page, "Common fields") == common
+
+
+@pytest.mark.parametrize("topic", sorted(TYPES))
+def test_the_page_tells_which_fields_may_be_missing_and_what_stands_for_them(page: str, topic: str) -> None:
+    listed = rows(page, f"`{topic}`") + (rows(page, "`posterior`") if topic == "fused" else [])
+    told = {name: kind.partition(" = ")[2] for names, kind in listed for name in names if " = " in kind}
+    assert told == defaults(topic)
+
+
+def test_the_page_lists_exactly_the_fields_of_the_model_answer(page: str) -> None:
+    assert documented(page, "The model query") == set(ModelAnswer.__struct_fields__)
 
 
 @pytest.mark.parametrize("topic", sorted(TYPES))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -101,3 +102,13 @@ def test_a_peer_of_which_nothing_is_heard_is_named_and_forgiven(configuration: C
     assert told[-1].reasons == ["nothing from lsu/v1/demo/health/main for 6 s"]
     assert pass_second().level == "OK"
     assert len(disk.recorded) == 12 * len(others) - 6
+
+
+def test_it_tells_when_and_where_it_was_started(configuration: Configuration) -> None:
+    line, watch = Line(), Watch()
+    parts: Any = (Disk(), line, watch)
+    began = watch.time
+    service = RecorderService(configuration, *parts)
+    watch.time += 5 * SECOND
+    service.turn()
+    assert (line.published[-1].started_ns, line.published[-1].host) == (began, socket.gethostname())

@@ -69,6 +69,9 @@ class Node(ABC):
         self.boot = boot
         self._digest = configuration.digest()
         self._sequences: dict[str, int] = {}
+        self.started_ns: int | None = None
+        self.host: str | None = None
+        """When its process started, and on what machine, told in the health; the service around it knows."""
         self.next_health = 0
         """When the next health message is due."""
         self._warnings: dict[tuple[str, str], int] = {}
@@ -85,7 +88,7 @@ class Node(ABC):
 
     @abstractmethod
     def receive(self, message: Message, now: int) -> list[Message]:
-        """Take a message that passed the gate; return what to publish."""
+        """Take a message that was admitted; return what to publish."""
 
     @abstractmethod
     def advance(self, now: int) -> list[Message]:
@@ -178,6 +181,8 @@ class Node(ABC):
             level="ERROR" if "ERROR" in levels else "WARN" if levels else "OK",
             reasons=[complaint.text for complaint in complaints],
             counters=self.admission.counters | self.counters() | self.gauges,
+            started_ns=self.started_ns,
+            host=self.host,
         )
 
     def complaints(self, now: int) -> list[Complaint]:

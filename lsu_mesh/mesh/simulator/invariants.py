@@ -44,7 +44,7 @@ class Life:
     sequences: dict[str, int] = field(default_factory=dict)
     """Next sequence number by topic."""
     taken: set[Reference] = field(default_factory=set)
-    """Every message that passed its gate."""
+    """Every message that was admitted."""
     revisions: dict[int, int] = field(default_factory=dict)
     """Next revision by step."""
 
@@ -76,7 +76,7 @@ class Invariants:
         self.health.pop(node.name, None)
 
     def admitted(self, node: Node, message: Message) -> None:
-        """A message has passed a gate; it never does so twice."""
+        """A message was admitted; that never happens twice."""
         taken = self._lives[node.boot].taken
         if message.reference in taken:
             raise InvariantBroken("dedupe", f"{node.role}/{node.name} took {message.reference} twice")

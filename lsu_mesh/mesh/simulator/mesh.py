@@ -120,7 +120,7 @@ class Process:
         self.wake(at + wait)
 
     def _take(self, arrival: Arrival) -> list[Message]:
-        """What ``Node.deliver`` does, with the witness between gate and node."""
+        """What ``Node.deliver`` does, with the witness between admission and node."""
         message = self.node.admission.admit(arrival.key, arrival.payload)
         if message is None:
             return []
@@ -188,7 +188,7 @@ class SimulatedMesh:
             return
         self._boots += 1
         node = self._made(role, name, f"{self._boots:08x}{self._rng.getrandbits(32):08x}")
-        node.admission.decoder = self._decoder.decode
+        node.admission.decoder = self._decoder.read
         process = Process(self, node, self._plan.skews.get(name, Skew()), self.configuration.cached)
         self.witness.began(node)
         self._greet(process, at)

@@ -38,7 +38,7 @@ def _tell(configuration: Configuration, options: argparse.Namespace) -> int:
 
 def _listen(configuration: Configuration, options: argparse.Namespace) -> list[PeerHealth]:
     """Heartbeats and liveliness of so many seconds, judged at their end."""
-    clock, gate, mesh = Clock(), Admission(configuration, ("health",)), configuration.mesh.name
+    clock, admission, mesh = Clock(), Admission(configuration, ("health",)), configuration.mesh.name
     observer = HealthObserver(configuration, clock.now())
     with Bus(session_settings(configuration, options), clock) as bus:
         bus.subscribe(f"{PREFIX}/{mesh}/health/*")
@@ -47,18 +47,18 @@ def _listen(configuration: Configuration, options: argparse.Namespace) -> list[P
         while (left := end - clock.now()) > 0:
             arrival = bus.next(left / SECOND)
             if arrival is not None:
-                record(observer, gate, arrival)
+                record(observer, admission, arrival)
         return observer.peers(clock.now())
 
 
-def record(observer: HealthObserver, gate: Admission, arrival: Arrival) -> None:
+def record(observer: HealthObserver, admission: Admission, arrival: Arrival) -> None:
     """Tell the observer what has come."""
     if arrival.what != "sample":
         address = parse(arrival.key)
         if address is not None:
             observer.record_presence(address.name, arrival.what == "alive")
         return
-    message = gate.admit(arrival.key, arrival.payload)
+    message = admission.admit(arrival.key, arrival.payload)
     if isinstance(message, Health):
         observer.record(message, arrival.arrival_ns)
 
@@ -68,7 +68,8 @@ def print_json(peers: Sequence[PeerHealth]) -> None:
     for peer in peers:
         about = {"name": peer.name, "role": peer.role, "level": peer.level, "reasons": list(peer.reasons)}
         age = None if peer.age_ns is None else peer.age_ns / SECOND
-        print(json.dumps(about | {"step": peer.step, "age_s": age, "counters": dict(peer.counters)}))
+        more = {"counters": dict(peer.counters), "started_ns": peer.started_ns, "host": peer.host}
+        print(json.dumps(about | {"step": peer.step, "age_s": age} | more))
 
 
 def _shown(name: str, count: float | None) -> str:
@@ -81,6 +82,12 @@ def refusals(peer: PeerHealth) -> dict[str, float]:
     """How many messages the peer has refused, by reason."""
     counters = peer.counters.items()
     return {name.removeprefix("refused."): count for name, count in counters if name.startswith("refused.")}
+
+
+def unknown_fields(peer: PeerHealth) -> dict[str, float]:
+    """How many fields the peer has ignored, by topic and name."""
+    prefix = "unknown fields."
+    return {name.removeprefix(prefix): count for name, count in peer.counters.items() if name.startswith(prefix)}
 
 
 def print_table(peers: Sequence[PeerHealth]) -> None:
@@ -102,6 +109,10 @@ def print_table(peers: Sequence[PeerHealth]) -> None:
         if refused := refusals(peer):
             by_reason = ", ".join(f"{count:g} by {reason}" for reason, count in refused.items())
             console.print(f"{peer.role}/{peer.name} has refused {by_reason}", markup=False, soft_wrap=True)
+        if ignored := unknown_fields(peer):
+            names = ", ".join(f"{name} {count:g} times" for name, count in ignored.items())
+            text = f"{peer.role}/{peer.name} ignores fields of a newer peer: {names}"
+            console.print(text, markup=False, soft_wrap=True)
         for reason in peer.reasons:
             console.print(f"{peer.level} {peer.role}/{peer.name}: {reason}", markup=False, soft_wrap=True)
     console.print(f"the mesh: {worst([peer.level for peer in peers])}")

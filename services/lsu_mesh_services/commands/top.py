@@ -159,6 +159,7 @@ def record(row: Row) -> dict[str, Any]:
         "name": health.name, "role": health.role, "level": health.level, "reasons": list(health.reasons),
         "step": row.step, "rate_hz": row.rate, "latency_ms": row.latency_ms, **counters,
         "age_s": None if health.age_ns is None else health.age_ns / SECOND,
+        "started_ns": health.started_ns, "host": health.host,
     }  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Asks again for what a subscriber's own recovery has left out.
 
 Advanced subscribers ask a publisher's cache once for what they missed. When that one question is lost, as it may be
-while a link comes back, the gap would stay. The gate counts gaps, and here they are asked for until they close.
+while a link comes back, the gap would stay. Admission counts gaps, and here they are asked for until they close.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ PATIENCE_NS = 2 * SECOND_NS
 class GapRecovery:
     """Asks, at each look, for the keys whose gaps have not changed since the look before.
 
-    ``ask`` gets a key and brings what its publisher's cache holds; copies are dropped by the gate.
+    ``ask`` gets a key and brings what its publisher's cache holds; copies are dropped by admission.
     """
 
-    def __init__(self, gate: Admission, ask: Callable[[str], None]) -> None:
-        self._gate = gate
+    def __init__(self, admission: Admission, ask: Callable[[str], None]) -> None:
+        self._admission = admission
         self._ask = ask
         self._last = -PATIENCE_NS
         self._seen: dict[str, int] = {}
@@ -42,7 +42,7 @@ class GapRecovery:
         if now < self._last + pause:
             return
         self._last = now
-        gaps = self._gate.gaps_by_key()
+        gaps = self._admission.gaps_by_key()
         for key, count in gaps.items():
             if self._seen.get(key) != count:
                 self._tries.pop(key, None)  # something comes: wait for the rest

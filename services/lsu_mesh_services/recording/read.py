@@ -8,7 +8,7 @@ import tempfile
 import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -55,6 +55,8 @@ class Recording:
     """Every message once, in the order of arrival."""
     damaged: list[str]
     """Payloads that were accepted when they were recorded and are no message any more, in words."""
+    unknown_fields: dict[str, int] = field(default_factory=dict)
+    """How often a field came that a newer peer wrote and this version does not know, by topic and name."""
 
 
 def read_recording(path: Path) -> Recording:
@@ -65,16 +67,17 @@ def read_recording(path: Path) -> Recording:
     files = parts(path)
     description = read_description(files[0])
     configuration = recorded_configuration(path, description)
-    gate = Admission(configuration, TYPES)
+    admission = Admission(configuration, TYPES)
     received, damaged = [], []
     for raw in read_raw(*files):
-        duplicates = gate.duplicates
-        message = gate.admit(raw.key, raw.payload)
+        duplicates = admission.duplicates
+        message = admission.admit(raw.key, raw.payload)
         if message is not None:
             received.append(Received(raw.arrival_ns, raw.key, raw.payload, message))
-        elif gate.duplicates == duplicates:
-            damaged.append(gate.last_refusal)
-    return Recording(files, description, configuration, received, damaged)
+        elif admission.duplicates == duplicates:
+            damaged.append(admission.last_refusal)
+    unknown = dict(admission.unknown_fields)
+    return Recording(files, description, configuration, received, damaged, unknown)
 
 
 def parts(path: Path) -> tuple[Path, ...]:

@@ -43,6 +43,7 @@ class Summary:
     events: dict[str, int]
     refused: int
     damaged: int
+    unknown_fields: dict[str, int]
 
 
 def summary(recording: Recording) -> Summary:
@@ -64,6 +65,7 @@ def summary(recording: Recording) -> Summary:
         events=dict(events.most_common()),
         refused=refused,
         damaged=len(recording.damaged),
+        unknown_fields=recording.unknown_fields,
     )
 
 
@@ -113,3 +115,6 @@ def print_summary(found: Summary, *, as_json: bool) -> None:
         console.print(f"{found.refused} payloads were refused when they were recorded", markup=False)
     if found.damaged:
         console.print(f"{found.damaged} payloads are damaged", markup=False)
+    if found.unknown_fields:
+        names = ", ".join(f"{name} {count} times" for name, count in found.unknown_fields.items())
+        console.print(f"fields of a newer version, not read: {names}", markup=False)

@@ -239,7 +239,7 @@ class Collections:
         self.took_ns = self._began = 0
         gc.callbacks.append(self._note)
 
-    def _record_message(self, phase: str, about: dict[str, int]) -> None:
+    def _note(self, phase: str, about: dict[str, int]) -> None:
         if phase == "start":
             self._began = time.thread_time_ns()
         else:

@@ -31,17 +31,17 @@ def payload(configuration: Configuration, seq: int) -> bytes:
 
 
 @pytest.fixture
-def gate(configuration: Configuration) -> Admission:
+def admission(configuration: Configuration) -> Admission:
     """Has seen 0, 1 and 5."""
-    gate = Admission(configuration, ["input"])
+    admission = Admission(configuration, ["input"])
     for seq in (0, 1, 5):
-        assert gate.admit(INPUT, payload(configuration, seq)) is not None
-    return gate
+        assert admission.admit(INPUT, payload(configuration, seq)) is not None
+    return admission
 
 
-def test_a_gap_that_stays_is_asked_for_at_each_look_and_not_forever(gate: Admission) -> None:
+def test_a_gap_that_stays_is_asked_for_at_each_look_and_not_forever(admission: Admission) -> None:
     asked: list[str] = []
-    recovery = GapRecovery(gate, asked.append)
+    recovery = GapRecovery(admission, asked.append)
     recovery.check(0)
     assert asked == [], "the subscriber's own recovery comes first"
     recovery.check(LOOK_NS - 1)
@@ -53,25 +53,27 @@ def test_a_gap_that_stays_is_asked_for_at_each_look_and_not_forever(gate: Admiss
     assert asked == [INPUT] * MAX_TRIES
 
 
-def test_a_gap_that_closes_is_asked_for_no_more(gate: Admission, configuration: Configuration) -> None:
+def test_a_gap_that_closes_is_asked_for_no_more(admission: Admission, configuration: Configuration) -> None:
     asked: list[str] = []
 
     def ask(address: str) -> None:
         asked.append(address)
         for seq in range(6):
-            gate.admit(address, payload(configuration, seq))
+            admission.admit(address, payload(configuration, seq))
 
-    recovery = GapRecovery(gate, ask)
+    recovery = GapRecovery(admission, ask)
     for second in range(5):
         recovery.check(second * SECOND_NS)
     assert asked == [INPUT]
-    assert (gate.gaps, gate.gaps_by_key()) == (0, {})
+    assert (admission.gaps, admission.gaps_by_key()) == (0, {})
 
 
-def test_a_peer_that_has_more_than_enough_to_do_asks_less_often_and_while_publishers_remember(gate: Admission) -> None:
+def test_a_peer_that_has_more_than_enough_to_do_asks_less_often_and_while_publishers_remember(
+    admission: Admission,
+) -> None:
     asked: list[int] = []
     second = 0
-    recovery = GapRecovery(gate, lambda _: asked.append(second))
+    recovery = GapRecovery(admission, lambda _: asked.append(second))
     for second in range(6):
         recovery.check(second * SECOND_NS, waiting=5000)
     assert asked == [2, 4], "it looks at 0, 2 and 4"
@@ -81,11 +83,11 @@ def test_a_peer_that_has_more_than_enough_to_do_asks_less_often_and_while_publis
     assert asked == [2, 4, 6, 7]
 
 
-def test_while_messages_come_the_rest_is_waited_for(gate: Admission, configuration: Configuration) -> None:
+def test_while_messages_come_the_rest_is_waited_for(admission: Admission, configuration: Configuration) -> None:
     asked: list[str] = []
-    recovery = GapRecovery(gate, asked.append)
+    recovery = GapRecovery(admission, asked.append)
     recovery.check(0)
-    gate.admit(INPUT, payload(configuration, 3))
+    admission.admit(INPUT, payload(configuration, 3))
     recovery.check(SECOND_NS)
     assert asked == []
     recovery.check(2 * SECOND_NS)

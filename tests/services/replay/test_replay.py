@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgpack
 import pytest
 from local_mesh import LocalMesh
 from lsu_mesh_services.cli import main
@@ -15,7 +17,7 @@ from lsu_mesh_services.recording.read import parts, read_recording
 from recorded_mesh import record
 
 from lsu_mesh.mesh.config import load
-from lsu_mesh.mesh.messages import Measurement, Message, Posterior
+from lsu_mesh.mesh.messages import Measurement, Message, Posterior, encode
 
 Run = Callable[..., tuple[int, list[dict[str, Any]], str]]
 
@@ -69,6 +71,54 @@ def test_one_bit_of_one_measurement(run: Run, mesh: LocalMesh, tmp_path: Path) -
     assert (first["peer"], first["step"]) in {("filter/box", 31), ("filter/cz", 31)}
     assert first["recorded"] != first["recomputed"]
     assert {line["step"] for line in of("difference", lines)} == {31}
+
+
+def newer(message: Message, payload: bytes) -> bytes:
+    """What a peer of a later release sends."""
+    fields = msgpack.unpackb(payload) | {"colour": "red"}
+    if "support" in fields:
+        fields["support"]["shade"] = [0.5]
+    return msgpack.packb(fields)
+
+
+@functools.cache
+def first_fields() -> dict[str, set[str]]:
+    """The fields of each topic in the first release."""
+    first = Path(__file__).parents[2] / "mesh" / "data" / "payloads-0.1" / "first.jsonl"
+    return {line["topic"]: set(line["fields"]) for line in map(json.loads, first.read_text().splitlines())}
+
+
+def older(message: Message, payload: bytes) -> bytes:
+    """What a peer of the first release sends."""
+    return msgpack.packb(
+        {name: value for name, value in msgpack.unpackb(payload).items() if name in first_fields()[message.topic]}
+    )
+
+
+@pytest.mark.parametrize("change", [newer, older])
+def test_recordings_of_other_releases_are_verified(
+    run: Run, mesh: LocalMesh, tmp_path: Path, change: Callable[[Message, bytes], bytes]
+) -> None:
+    path = record(mesh, tmp_path / "other.rrd", change)
+    payloads = [one.payload for one in read_recording(path).received]
+    assert payloads == [change(message, encode(message)) for _, message in mesh.sent], "kept as they came"
+    code, lines, _ = run(path, "--verify")
+    assert code == OK
+    (summary,) = of("verification", lines)
+    assert summary["exact"] == 3 * 60 * 2 + 60
+    assert summary["different"] == summary["unverifiable"] == summary["miss_truth"] == 0
+
+
+def test_a_recording_tells_which_fields_were_not_read(
+    mesh: LocalMesh, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = record(mesh, tmp_path / "newer.rrd", newer)
+    found = read_recording(path).unknown_fields
+    assert found["posterior.support.shade"] == 3 * 60
+    assert set(found) >= {f"{topic}.colour" for topic in ("truth", "input", "measurement", "prediction", "fused")}
+    assert read_recording(recording).unknown_fields == {}
+    assert main(["recording", "info", str(path)]) == OK
+    assert "fields of a newer version, not read: " in capsys.readouterr().out
 
 
 def test_a_payload_that_is_no_message_any_more_is_named(run: Run, mesh: LocalMesh, tmp_path: Path) -> None:

@@ -1,0 +1,37 @@
+"""What a mesh tells of its model is what its file says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgpack
+
+from lsu_mesh.mesh.config import load
+from lsu_mesh.mesh.model_answer import encode_model, model_answer
+
+
+def test_plain_msgpack_reads_the_model(demo: Path) -> None:
+    configuration = load(demo)
+    model = configuration.base_model
+    told = msgpack.unpackb(encode_model(model_answer(configuration)))
+    assert (told["v"], told["model"], told["dt"]) == (1, configuration.digest(), configuration.mesh.dt)
+    assert told["A"] == model.A.tolist()
+    assert model.B is not None
+    assert told["B"] == model.B.tolist()
+    assert told["rho"] == model.rho.tolist()
+    assert (told["states"], told["units"]) == (list(model.states), list(model.units))
+    assert set(told["sensors"]) == set(configuration.sensors)
+    for name, sensor in configuration.sensors.items():
+        rows = [list(row) for row in sensor.C]
+        assert told["sensors"][name] == {"C": rows, "r": list(sensor.r), "outputs": list(sensor.outputs)}
+    assert (told["start_ns"], told["boot"]) == (None, None), "kept for later, and told by nobody yet"
+
+
+def test_what_a_model_does_not_have_is_nil(tmp_path: Path) -> None:
+    file = tmp_path / "mesh.toml"
+    file.write_text(
+        '[mesh]\nname = "still"\ndt = 1.0\n[model]\nA = [[1.0]]\nrho = [0.1]\n[model.prior]\nlower = [0.0]\n'
+        'upper = [1.0]\n[plant]\n[sensors.s]\nC = [[1.0]]\nr = [0.1]\n[filters.f]\nkind = "LSUO"\nsensors = ["s"]\n'
+    )
+    told = msgpack.unpackb(encode_model(model_answer(load(file))))
+    assert (told["B"], told["noise_map"]) == (None, None)
