@@ -64,13 +64,15 @@ def main(options: argparse.Namespace) -> int:
 
 def _print(found: list[Check]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     for check in found:
         style = STYLES[check.level]
-        table.add_row(f"[{style}]{check.level}[/]", check.what, f"{check.words}{check.remedy and f'; {check.remedy}'}")
+        words = f"{check.words}; {check.remedy}" if check.remedy else check.words
+        table.add_row(f"[{style}]{check.level}[/]", check.what, escape(words))
     console.print(table)
 
 
