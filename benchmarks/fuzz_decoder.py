@@ -1,6 +1,6 @@
 """Coverage-guided fuzzing of the decoder and of the nodes with Atheris (libFuzzer); ends at the first crash.
 
-    pip install -c constraints.txt ".[mesh,fuzz]"
+    pip install -c constraints.txt ".[fuzz]"
     python benchmarks/fuzz_decoder.py -max_total_time=60
 
 Arguments are libFuzzer's. The first byte of an input chooses the topic, the rest is the payload.

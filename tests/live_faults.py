@@ -283,7 +283,12 @@ def slow_subscriber(mesh: LiveMesh, seconds: float = 10.0) -> Outcome:
         f"bus.subscribe('{PREFIX}/*/*/*')\nbus.next(60)\nprint('hears', flush=True)\ntime.sleep(600)\n"
     )
     command = [sys.executable, "-c", program, mesh.configuration.network.entry]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'services'}"},
+    )
     try:
         assert process.stdout is not None
         assert process.stdout.readline() == "hears\n"

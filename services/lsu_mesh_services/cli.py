@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-from lsu_mesh_services.exit_codes import FAILURE
+from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE
+from lsu_mesh_services.extras import refusal
 from lsu_mesh_services.options import (
     bench,
     doctor,
@@ -74,6 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     import importlib
 
     options = build_parser().parse_args(arguments)
+    if words := refusal(options):
+        print(words, file=sys.stderr)
+        return COULD_NOT_START
     if getattr(options, "runs_until_stopped", False):
         options.stop = Stop()  # before the imports of the command, which take a while
     handler: Callable[[argparse.Namespace], int] = importlib.import_module(options.handler).main
@@ -88,6 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def entry() -> NoReturn:
     """Entry point of ``lsu-mesh``."""
+    os.environ["PYTHONSAFEPATH"] = "1"  # no child, a worker of a pool neither, imports what lies in the working folder
     leave(main())
 
 

@@ -14,12 +14,13 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
-from lsu_mesh_services.configuration import DEMO, any_port, flags, with_session
+from lsu_mesh_services.configuration import DEMO, flags
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
 from lsu_mesh_services.monitoring.run_report import RunReport
 from lsu_mesh_services.monitoring.table import Progress, print_json, print_table
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.network.security import certificates, check_endpoints
+from lsu_mesh_services.session import any_port, with_session
 from lsu_mesh_services.stop import Stop
 from lsu_mesh_services.supervisor import Supervisor
 from lsu_mesh_services.viewers import Viewer, free_port
@@ -324,7 +325,7 @@ def _sum_up(run: Run) -> int:
 def _opening_line(recording: Path | None) -> str:
     if recording is None:
         return ""
-    module = [sys.executable, "-m", "lsu_mesh_services"]
+    module = [sys.executable, "-P", "-m", "lsu_mesh_services"]
     program: Sequence[str] = [sys.argv[0]] if sys.argv[0].endswith("lsu-mesh") else module
     return " ".join([_relative(program[0]), *program[1:], "view", str(recording)])
 

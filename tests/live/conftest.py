@@ -7,7 +7,7 @@ import json
 import os
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -61,15 +61,18 @@ Start = Callable[..., Session]
 
 @pytest.fixture
 def start(lsu_mesh_command: list[str], root: Path, tmp_path: Path) -> Iterator[Start]:
-    """Start ``lsu-mesh`` with arguments; ``{endpoint}`` in them is a free port. Nothing outlives the test."""
+    """Start ``lsu-mesh`` with arguments; ``{endpoint}`` in them is a free port. Nothing outlives the test.
+
+    ``paths`` come before the checkout where Python looks for modules; ``command`` is another way to start it.
+    """
     started: list[Session] = []
 
-    def begin(*arguments: str, endpoint: str = "") -> Session:
+    def begin(*arguments: str, endpoint: str = "", paths: Sequence[str] = (), command: Sequence[str] = ()) -> Session:
         endpoint = endpoint or f"tcp/127.0.0.1:{free_port()}"
-        command = [*lsu_mesh_command, *(argument.replace("{endpoint}", endpoint) for argument in arguments)]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(root / "services")])}
+        words = [*(command or lsu_mesh_command), *(argument.replace("{endpoint}", endpoint) for argument in arguments)]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([*paths, str(root), str(root / "services")])}
         process = subprocess.Popen(
-            command, cwd=tmp_path, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            words, cwd=tmp_path, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
         )
         session = Session(process, endpoint, tmp_path)
         started.append(session)

@@ -61,5 +61,5 @@ def _children_seconds() -> float:
 
 
 def _python(program: str) -> Any:
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-P", "-c", program], capture_output=True, text=True, check=True)
     return json.loads(done.stdout)

@@ -20,12 +20,18 @@ from typing import Literal, NamedTuple
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
+from lsu_mesh_services.extras import EXTRAS, MESH, RECORD, Extra
 from lsu_mesh_services.network.security import missing_files
 
 Level = Literal["ok", "warn", "fail"]
 MIN_PYTHON = (3, 11)
-NEEDED = ("numpy", "scipy", "numba", "msgspec", "eclipse-zenoh", "rerun-sdk", "rich", "pyarrow", "cryptography")
-CONSTRAINTS = Path(__file__).resolve().parents[2] / "constraints.txt"
+NEEDED = ("numpy", "scipy", "numba", "msgspec", "rich")
+CONSTRAINTS = Path(__file__).resolve().parents[3] / "constraints.txt"
+WITHOUT: dict[str, tuple[Level, str]] = {
+    MESH.name: ("fail", "no peer can start here"),
+    RECORD.name: ("warn", "a run is not recorded, recordings cannot be read"),
+}
+"""What a missing extra means."""
 ENOUGH_FILES, MIN_FILES = 1024, 256
 ENOUGH_DISK, LEAST_DISK = 2**30, 100 * 2**20
 PEER_MEMORY = 200 * 2**20
@@ -58,13 +64,15 @@ def main(options: argparse.Namespace) -> int:
 
 def _print(found: list[Check]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     console = Console(width=None if sys.stdout.isatty() else 140, highlight=False)
     table = Table(box=None, pad_edge=False, show_header=False)
     for check in found:
         style = STYLES[check.level]
-        table.add_row(f"[{style}]{check.level}[/]", check.what, f"{check.words}{check.remedy and f'; {check.remedy}'}")
+        words = f"{check.words}; {check.remedy}" if check.remedy else check.words
+        table.add_row(f"[{style}]{check.level}[/]", check.what, escape(words))
     console.print(table)
 
 
@@ -72,6 +80,7 @@ def checks(configuration: Configuration) -> Iterator[Check]:
     """Everything that is looked at, in turn."""
     yield python_version(sys.version_info[:3])
     yield from packages(_pinned())
+    yield from (extra_installed(extra) for extra in EXTRAS)
     yield kernels()
     yield entry_port(configuration.network.entry)
     yield from certificates(configuration)
@@ -101,13 +110,14 @@ def _pinned() -> dict[str, str]:
 
 
 def packages(pinned: dict[str, str]) -> Iterator[Check]:
-    """Whether all are installed, in the tested versions."""
+    """Whether the base is installed, and all that is installed is in the tested versions."""
     others = []
-    for name in NEEDED:
+    for name in dict.fromkeys([*NEEDED, *(name for extra in EXTRAS for name in extra.modules)]):
         try:
             version = importlib.metadata.version(name)
         except importlib.metadata.PackageNotFoundError:
-            yield Check("packages", "fail", f"{name} is not installed", 'make setup, or pip install "lsu-mesh[mesh]"')
+            if name in NEEDED:
+                yield Check("packages", "fail", f"{name} is not installed", "make setup, or pip install lsu-mesh")
             continue
         if version != pinned.get(name, version):
             others.append(f"{name} {version} (tested: {pinned[name]})")
@@ -115,6 +125,15 @@ def packages(pinned: dict[str, str]) -> Iterator[Check]:
         yield Check("packages", "warn", ", ".join(others), "pip install -c constraints.txt brings the tested versions")
     else:
         yield Check("packages", "ok", "all in the tested versions" if pinned else "all there")
+
+
+def extra_installed(extra: Extra) -> Check:
+    """Whether an extra is there, and what works without it."""
+    what, missing = f"extra {extra.name}", extra.missing()
+    if not missing:
+        return Check(what, "ok", ", ".join(extra.modules))
+    level, words = WITHOUT[extra.name]
+    return Check(what, level, f"{', '.join(missing)} not installed: {words}", extra.remedy)
 
 
 def kernels() -> Check:
@@ -224,7 +243,7 @@ def load(average: float, cores: int) -> Check:
 def viewer(program: Path, environment: os._Environ[str] | dict[str, str]) -> Check:
     """Whether recordings can be looked at here."""
     if not program.exists():
-        return Check("viewer", "warn", f"no {program}", "pip install rerun-sdk; recordings are written all the same")
+        return Check("viewer", "warn", f"no {program}", f"{RECORD.remedy}; the mesh runs without it")
     if not (environment.get("DISPLAY") or environment.get("WAYLAND_DISPLAY")) and sys.platform == "linux":
         return Check("viewer", "warn", "found, but there is no display", "lsu-mesh run --web serves it to a browser")
     return Check("viewer", "ok", str(program))

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from lsu_mesh.mesh.access import EVERY_PEER
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.flows import Flow, Peer, flows, in_order
-from lsu_mesh_services.exit_codes import OK
-from lsu_mesh_services.monitoring.subscriber import run_tool, watching
+from lsu_mesh_services.configuration import load_or_explain
+from lsu_mesh_services.exit_codes import OK, USAGE
 
 PRESENCE_S = 1.0
 """Tokens of those who are there come at once."""
@@ -18,11 +18,17 @@ SHAPES = {"sensor": "oval", "fusion": "hexagon"}
 
 
 def main(options: argparse.Namespace) -> int:
-    return run_tool(options, _graph)
+    if options.live:
+        from lsu_mesh_services.monitoring.subscriber import run_tool
+
+        return run_tool(
+            options, lambda configuration, _: _draw(configuration, options, _present(configuration, options))
+        )
+    configuration = load_or_explain(options.config, options)
+    return USAGE if configuration is None else _draw(configuration, options, None)
 
 
-def _graph(configuration: Configuration, options: argparse.Namespace) -> int:
-    there = _present(configuration, options) if options.live else None
+def _draw(configuration: Configuration, options: argparse.Namespace, there: set[str] | None) -> int:
     peers, own = in_order(configuration), _own(configuration)
     drawn: Callable[[Sequence[Peer], Sequence[Flow], set[str] | None], str] = (
         dot if options.dot else mermaid if options.mermaid else lines if options.json else text
@@ -37,6 +43,8 @@ def _own(configuration: Configuration) -> list[Flow]:
 
 
 def _present(configuration: Configuration, options: argparse.Namespace) -> set[str]:
+    from lsu_mesh_services.monitoring.subscriber import watching
+
     there: set[str] = set()
     with watching(configuration, options) as watch:
         watch.listen([])

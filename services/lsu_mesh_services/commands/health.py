@@ -14,9 +14,10 @@ from lsu_mesh.mesh.messages import Health
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
 from lsu_mesh_services.bus import Bus, Clock
-from lsu_mesh_services.configuration import load_or_explain, session_settings, with_session
+from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
 from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.session import session_settings, with_session
 
 SHOWN = ("received", "gaps", "duplicates", "dropped", "late", "rewinds", "contradictions", "behind", "queue", "step_ms")
 """Counters with a column of their own; refusals are summed, and told by reason below the table."""

@@ -12,8 +12,9 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.table import nearest
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from lsu_mesh_services.configuration import load_or_explain, session_settings, with_session
+from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import USAGE
+from lsu_mesh_services.session import session_settings, with_session
 
 
 def main(options: argparse.Namespace) -> int:

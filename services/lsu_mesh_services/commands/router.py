@@ -8,10 +8,11 @@ import time
 
 from lsu_mesh.mesh.keys import ROUTER
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
-from lsu_mesh_services.configuration import load_or_explain, with_session
+from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.network.security import certificates, check_endpoints
 from lsu_mesh_services.peer import MAX_WAIT
+from lsu_mesh_services.session import with_session
 from lsu_mesh_services.stop import Stop
 
 DEFAULT_LISTEN = "tcp/127.0.0.1:7447"

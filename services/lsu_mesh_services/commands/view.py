@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from lsu_mesh_services.exit_codes import COULD_NOT_START, USAGE
+from lsu_mesh_services.extras import RECORD
 from lsu_mesh_services.recording.repair import quiet_environment
 
 MAGIC = (b"RRF2", b"RRF0", b"RRIO")
@@ -28,5 +29,5 @@ def main(options: argparse.Namespace) -> int:
     try:
         return subprocess.call([str(viewer), str(path)], env=quiet_environment())
     except FileNotFoundError:
-        print(f"{viewer} is missing; install the extra: pip install 'lsu-mesh[mesh]'", file=sys.stderr)
+        print(f"{viewer} is missing: {RECORD.remedy}", file=sys.stderr)
         return COULD_NOT_START

@@ -15,9 +15,10 @@ from lsu_mesh.mesh.keys import key, parse
 from lsu_mesh.mesh.messages import TYPES, Message
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh_services.bus import Bus, Clock
-from lsu_mesh_services.configuration import load_or_explain, session_settings, with_session
+from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, USAGE
 from lsu_mesh_services.network.addresses import Addresses, WrongAddress
+from lsu_mesh_services.session import session_settings, with_session
 from lsu_mesh_services.stop import Stop
 
 LINK_S = 3.0

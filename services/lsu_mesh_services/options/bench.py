@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lsu_mesh_services.extras import RECORD
 from lsu_mesh_services.options.parsing import Commands, new_command
 
 
@@ -21,4 +22,7 @@ def add(commands: Commands) -> None:
     parser.add_argument("--quick", action="store_true", help="few sizes and rounds: shows that it works, not how fast")
     parser.add_argument("--out", metavar="DIR", help="folder for the figure and the JSON file (needs matplotlib)")
     parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of tables")
-    parser.set_defaults(handler="lsu_mesh_services.commands.bench")
+    parser.set_defaults(
+        handler="lsu_mesh_services.commands.bench",
+        extra=lambda options: RECORD if options.what == "recording" else None,
+    )

@@ -12,4 +12,4 @@ def add(commands: Commands) -> None:
     parser.add_argument("config", nargs="?", metavar="mesh.toml", help="configuration (default: the packaged demo)")
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout: one per check")
     add_overrides(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.doctor")
+    parser.set_defaults(handler="lsu_mesh_services.commands.doctor", extra=None)

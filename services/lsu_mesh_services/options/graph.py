@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lsu_mesh_services.extras import MESH
 from lsu_mesh_services.options.parsing import Commands, add_network, add_overrides, new_command
 
 
@@ -17,4 +18,6 @@ def add(commands: Commands) -> None:
     shape.add_argument("--json", action="store_true", help="JSON lines on stdout: one per peer and one per key")
     add_overrides(parser)
     add_network(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.graph")
+    parser.set_defaults(
+        handler="lsu_mesh_services.commands.graph", extra=lambda options: MESH if options.live else None
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lsu_mesh_services.extras import MESH
 from lsu_mesh_services.options.parsing import Commands, add_network, add_overrides, new_command
 
 
@@ -15,4 +16,4 @@ def add(commands: Commands) -> None:
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout: one per peer")
     add_overrides(parser)
     add_network(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.health")
+    parser.set_defaults(handler="lsu_mesh_services.commands.health", extra=MESH)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lsu_mesh_services.extras import RECORD
 from lsu_mesh_services.options.parsing import Commands, add_overrides, new_command
 
 LEARN = ("both", "r", "rho", "separate")
@@ -32,4 +33,6 @@ def add(commands: Commands) -> None:
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of words")
     add_overrides(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.identify")
+    parser.set_defaults(
+        handler="lsu_mesh_services.commands.identify", extra=lambda options: RECORD if options.recording else None
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lsu_mesh_services.extras import MESH
 from lsu_mesh_services.options.parsing import Commands, add_overrides, new_command
 
 
@@ -16,4 +17,4 @@ def add(commands: Commands) -> None:
     )  # fmt: skip
     parser.add_argument("--days", type=int, default=365, metavar="N", help="how long they are valid (default: 365)")
     add_overrides(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.keys")
+    parser.set_defaults(handler="lsu_mesh_services.commands.keys", extra=MESH)

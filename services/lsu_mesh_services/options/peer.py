@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from lsu_mesh_services.extras import MESH, RECORD
 from lsu_mesh_services.options.parsing import Commands, add_network, add_overrides, new_command
 
 ROLES = {
@@ -53,7 +54,12 @@ def _add_peer(commands: Commands, role: str, words: str) -> None:
         )  # fmt: skip
     add_overrides(parser)
     add_network(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.peer", runs_until_stopped=True, role=role)
+    parser.set_defaults(
+        handler="lsu_mesh_services.commands.peer",
+        extra=RECORD if role == "recorder" else MESH,
+        runs_until_stopped=True,
+        role=role,
+    )
 
 
 def _add_router(commands: Commands) -> None:
@@ -64,4 +70,4 @@ def _add_router(commands: Commands) -> None:
     )
     add_overrides(parser)
     add_network(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.router", runs_until_stopped=True)
+    parser.set_defaults(handler="lsu_mesh_services.commands.router", extra=MESH, runs_until_stopped=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from lsu_mesh_services.extras import RECORD
 from lsu_mesh_services.options.parsing import EXIT_CODES, Commands, new_command
 
 
@@ -24,7 +25,7 @@ def add(commands: Commands) -> None:
     export.add_argument("file", metavar="FILE.rrd", help="recording; its parts are found beside it")
     export.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the tables (default: csv)")
     export.add_argument("-o", "--out", metavar="DIR", help="a new or empty folder (default: FILE without .rrd)")
-    parser.set_defaults(handler="lsu_mesh_services.commands.recording")
+    parser.set_defaults(handler="lsu_mesh_services.commands.recording", extra=RECORD)
 
 
 def _new(inner: Commands, name: str, words: str) -> argparse.ArgumentParser:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lsu_mesh_services.extras import RECORD
 from lsu_mesh_services.options.parsing import Commands, new_command
 
 
@@ -24,4 +25,4 @@ def add(commands: Commands) -> None:
         "-X", dest="overrides", metavar="TABLE.KEY=VALUE", action="append", default=[],
         help="set any key of the configuration that is replayed, such as -X filters.cz.max_generators=30",
     )  # fmt: skip
-    parser.set_defaults(handler="lsu_mesh_services.commands.replay")
+    parser.set_defaults(handler="lsu_mesh_services.commands.replay", extra=RECORD)

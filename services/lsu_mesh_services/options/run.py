@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import argparse
+
+from lsu_mesh_services.extras import MESH, RECORD, Extra
 from lsu_mesh_services.options.parsing import Commands, add_insecure, add_overrides, new_command
 
 
@@ -22,4 +25,10 @@ def add(commands: Commands) -> None:
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout instead of a table")
     add_insecure(parser)
     add_overrides(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.run", runs_until_stopped=True)
+    parser.set_defaults(handler="lsu_mesh_services.commands.run", extra=_extra, runs_until_stopped=True)
+
+
+def _extra(options: argparse.Namespace) -> Extra:
+    """A recording, and a viewer, which follows it, need more than the mesh does."""
+    wants_recording = options.record is not None or options.view or options.web is not None
+    return RECORD if wants_recording else MESH

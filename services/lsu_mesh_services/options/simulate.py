@@ -22,4 +22,4 @@ def add(commands: Commands) -> None:
     parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per processor)")
     parser.add_argument("--minutes", type=float, metavar="M", help="begin no more seeds after so many minutes")
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout: one per broken seed, and the sum")
-    parser.set_defaults(handler="lsu_mesh_services.commands.simulate")
+    parser.set_defaults(handler="lsu_mesh_services.commands.simulate", extra=None)

@@ -11,4 +11,4 @@ def add(commands: Commands) -> None:
     parser.add_argument("file", metavar="mesh.toml", help="configuration to check")
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout")
     add_overrides(parser)
-    parser.set_defaults(handler="lsu_mesh_services.commands.validate")
+    parser.set_defaults(handler="lsu_mesh_services.commands.validate", extra=None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from lsu_mesh_services.extras import RECORD
 from lsu_mesh_services.options.parsing import Commands, new_command
 
 
@@ -9,4 +10,4 @@ def add(commands: Commands) -> None:
     """The command ``view``."""
     parser = new_command(commands, "view", "open a recording in the Rerun viewer")
     parser.add_argument("file", metavar="FILE.rrd", help="recording to open")
-    parser.set_defaults(handler="lsu_mesh_services.commands.view")
+    parser.set_defaults(handler="lsu_mesh_services.commands.view", extra=RECORD)

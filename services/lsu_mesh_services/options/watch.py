@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
+from lsu_mesh_services.extras import MESH
 from lsu_mesh_services.options.parsing import Commands, add_network, add_overrides, new_command
 
 ADDRESS = "TOPIC/NAME"
@@ -58,7 +59,7 @@ def _tool(commands: Commands, name: str, words: str, example: str) -> argparse.A
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout")
     add_overrides(parser)
     add_network(parser)
-    parser.set_defaults(runs_until_stopped=True)
+    parser.set_defaults(runs_until_stopped=True, extra=MESH)
     return parser
 
 

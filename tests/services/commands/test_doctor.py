@@ -68,7 +68,7 @@ def test_little_room_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_missing_viewer_or_display_is_told(tmp_path: Path) -> None:
     program = tmp_path / "rerun"
-    assert "recordings are written all the same" in doctor.viewer(program, {}).remedy
+    assert "the mesh runs without it" in doctor.viewer(program, {}).remedy
     program.touch()
     assert "--web" in doctor.viewer(program, {}).remedy
     assert doctor.viewer(program, {"DISPLAY": ":0"}).level == "ok"
