@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import Literal, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.window.batch_map import Record, batch_map, record
@@ -20,7 +21,6 @@ from lsu_mesh.filters.window.structure import Structure, Unknown, UnknownEntries
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
 Learn = Literal["both", "r", "rho", "separate"]
 LEARN: tuple[Learn, ...] = ("both", "r", "rho", "separate")
 MAX_BROKEN = 1000

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.errors import ModelError
 
 if TYPE_CHECKING:
     from lsu_mesh.supports.orthotope import Orthotope
-
-Array = NDArray[np.float64]
 
 
 class LSUModel:

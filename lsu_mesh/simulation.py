@@ -14,12 +14,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels import plant_step
 from lsu_mesh.model import LSUModel
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Noise = Literal["uniform", "corners"]
 
 SINE_PERIOD = 100

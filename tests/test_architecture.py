@@ -12,6 +12,7 @@ import pytest
 
 LAYERS = {
     "lsu_mesh.errors": 0,
+    "lsu_mesh.array_types": 0,
     "lsu_mesh.kernels": 1,
     "lsu_mesh.supports": 2,
     "lsu_mesh.model": 3,

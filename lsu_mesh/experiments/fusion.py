@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Vector
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
 from lsu_mesh.experiments.workers import Watch, spread, unwatched
 from lsu_mesh.filters.filter import Filter
@@ -29,7 +29,6 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import simulate
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
 Make = Callable[[LSUModel, Orthotope], Filter]
 
 C = ((1.0, 0.0, 0.5), (0.0, 1.0, 0.5), (1.0, -1.0, 0.3))

@@ -11,14 +11,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Stack
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation, generator
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
 
 
 class Draws(NamedTuple):

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
@@ -26,9 +26,6 @@ from lsu_mesh.filters.lsupb import LSUPB
 from lsu_mesh.filters.zonotopic_kalman import ZonotopicKalman
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 FILTERS: dict[str, Callable[[LSUModel, Orthotope], Filter]] = {
     "LSUO": LSUO,

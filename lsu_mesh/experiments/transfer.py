@@ -14,9 +14,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.experiments.fusion import Make
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
@@ -34,7 +34,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Vector = NDArray[np.float64]
 
 KINDS: Mapping[str, Make] = {
     "LSUO lp": lambda model, prior: LSUO(model, prior, hull="lp"),

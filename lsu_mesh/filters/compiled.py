@@ -7,8 +7,9 @@ from abc import abstractmethod
 from typing import ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
@@ -25,9 +26,6 @@ from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class CompiledFilter(Filter):

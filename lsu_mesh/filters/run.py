@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, LsuMeshError, ModelError, UnboundedSupport
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.kernels import batch_run
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 
 class FilterRun(NamedTuple):

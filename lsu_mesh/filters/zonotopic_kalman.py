@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
@@ -28,9 +29,6 @@ from lsu_mesh.supports.linear_programs import is_proved_empty
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class Strips(NamedTuple):

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 SupportPoints = Callable[[Matrix], Matrix]
 """Directions (k, n) → a point of the set (k, n) that is farthest in each."""
 Surface = Callable[[Matrix, Vector, Matrix], Matrix]

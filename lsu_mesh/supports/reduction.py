@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.linear_programs.safe_maxima import open_program, variable_ranges
 from lsu_mesh.kernels.zonotopes.complexity_reduction import reduce_complexity
 from lsu_mesh.supports.linear_programs import program_maxima
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Body = tuple[Vector, Matrix, Matrix, Vector]
 
 

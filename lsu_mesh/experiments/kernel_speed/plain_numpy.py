@@ -12,11 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes.strip_update import TIE
 from lsu_mesh.model import LSUModel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class PlainModel(NamedTuple):

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.outcome import Check, Outcome
 from lsu_mesh.experiments.p2014.figures import (
     INTERVAL_WINDOW,
@@ -18,7 +19,7 @@ from lsu_mesh.experiments.p2014.figures import (
     timings,
     traces,
 )
-from lsu_mesh.experiments.p2014.runs import CORRELATED, KNOWN, UNCORRELATED, Array, Case, Job, Result, result
+from lsu_mesh.experiments.p2014.runs import CORRELATED, KNOWN, UNCORRELATED, Case, Job, Result, result
 from lsu_mesh.experiments.p2014.tables import (
     KALMAN,
     TABLE_I,

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.outcome import Cell, Column, Table
 from lsu_mesh.experiments.p2014.runs import CORRELATED, KAPPAS, F, Job, estimator, simulate
 from lsu_mesh.filters.window.window_map import WindowMAP
@@ -19,7 +19,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 WINDOWS = (5, 25)
 INTERVAL_WINDOW = 25
 """Δ of Figure 2: the paper does not say which."""

@@ -6,15 +6,14 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array, Flags
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.truncated_kalman import TruncatedKalman
 from lsu_mesh.filters.window.window_map import WindowMAP
 from lsu_mesh.model import LSUModel
 
-Array = NDArray[np.float64]
-Shares = NDArray[np.float64] | NDArray[np.bool_]
+Shares = Array | Flags
 A = ((1.0, -0.5, 0.2), (0.5, 0.1, 0.0), (0.3, 0.0, -0.1))
 B = ((0.1,), (0.6,), (0.3,))
 C = ((1.0, 0.0, 0.5), (0.0, 1.0, 0.5))

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.outcome import Cell, Column, Table
 from lsu_mesh.experiments.p2018.runs import data_of, prior
 from lsu_mesh.filters.lsuo import LSUO
@@ -20,7 +20,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 FIRST, LAST = 40, 70
 """Steps that Figure 1 shows."""
 DIMENSIONS = (2, 3, 5, 8, 12, 20, 30)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
@@ -21,8 +21,6 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation, random_uniform, simulate
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Make = Callable[[LSUModel, Orthotope], Filter]
 
 STEPS = 100

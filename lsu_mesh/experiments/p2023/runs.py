@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Matrix
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
@@ -18,8 +18,6 @@ from lsu_mesh.filters.run import run_filter
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation, random_uniform, simulate
 from lsu_mesh.supports.orthotope import Orthotope
-
-Matrix = NDArray[np.float64]
 
 OMEGA = 1e-4
 START = 0.1

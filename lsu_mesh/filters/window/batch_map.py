@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.window.program import HalfWidths, Selected, WindowData, WindowProgram, WindowSolution
 from lsu_mesh.filters.window.structure import Structure
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 SETTLED = 1e-6
 """Passes end when no unknown entry moves by more than this share of its range."""
 SHORTEST_STEP = 1.0 / 64.0

@@ -17,14 +17,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Stack, Vector
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.filters.window.structure import Structure
 from lsu_mesh.kernels.linear_programs.interior_point import Limits, Rows
 from lsu_mesh.kernels.linear_programs.window_program import data_size, solve_window
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
 Selected = Literal["centre", "vertex"]
 
 ACCEPTED_GAP = 1e-7

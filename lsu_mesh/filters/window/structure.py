@@ -12,13 +12,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.model import LSUModel
 
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 MATRICES = ("A", "B", "C", "E", "F")
 
 

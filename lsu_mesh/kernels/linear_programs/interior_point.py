@@ -15,14 +15,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Indices, Matrix, Vector
 from lsu_mesh.kernels.linear_programs.bordered_systems import factor_bordered, solve_bordered
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 TO_BOUNDARY = 0.99
 EQUATION = 1e-9

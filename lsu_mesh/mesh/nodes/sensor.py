@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.config.settings import Configuration, SensorFault
@@ -16,7 +17,6 @@ from lsu_mesh.mesh.nodes.plant import MAX_AT_ONCE
 from lsu_mesh.mesh.nodes.rate_limit import RateLimit
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.simulation import measure, random_uniform
-from lsu_mesh.supports.support import Vector
 
 
 class SimulatedSensorNode(Node):

@@ -7,8 +7,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.mesh.messages import Posterior, Truth
 from lsu_mesh_services.recording.bands import band_columns, band_style, error_columns, error_style, line_style
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
@@ -18,7 +18,6 @@ from lsu_mesh_services.recording.timeline import Moment, Timelines
 REMEMBERED = 4096
 """Steps for which a truth waits for sets and sets wait for the truth."""
 
-Array = NDArray[np.float64]
 Kept = TypeVar("Kept")
 
 
