@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.array_types import Indices, Vector
 from lsu_mesh.errors import InconsistentData
-from lsu_mesh.kernels.linear_programs.interior_point import Limits, Rows
+from lsu_mesh.kernels.linear_programs.banded_program import Limits, Rows
 from lsu_mesh.kernels.linear_programs.window_program import checked, in_units_of
 
 INFEASIBLE = 2

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from lsu_mesh.array_types import Matrix, Stack, Vector
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.filters.window.structure import Structure
-from lsu_mesh.kernels.linear_programs.interior_point import Limits, Rows
+from lsu_mesh.kernels.linear_programs.banded_program import Limits, Rows
 from lsu_mesh.kernels.linear_programs.window_program import data_size, solve_window
 
 Selected = Literal["centre", "vertex"]

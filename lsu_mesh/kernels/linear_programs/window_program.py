@@ -9,17 +9,17 @@ from __future__ import annotations
 import numpy as np
 
 from lsu_mesh.array_types import Matrix, Vector
-from lsu_mesh.kernels.linear_programs.interior_point import (
+from lsu_mesh.kernels.linear_programs.banded_program import (
     IS_FIXED,
     NO_LIMIT,
     Limits,
     Point,
     Rows,
-    improve,
     is_equation,
     objective,
     row_values,
 )
+from lsu_mesh.kernels.linear_programs.interior_point import improve
 from lsu_mesh.kernels.runtime.compile import inner, kernel
 
 MARGIN = 0.1
