@@ -130,9 +130,20 @@ def explain(
     found = structure.model_at(answer.theta, rho, r)
     rest = Record(data.Y[count:], data.U[count:]) if len(data.Y) - count >= 2 else None
     return Explanation(
-        found, rho, r, answer.rho, answer.r, np.nan if learn == "separate" else answer.objective, margin, learn,
-        answer.theta, structure.entries, 1, count, None if rest is None else _try(found, rest, count + 1),
-    )  # fmt: skip
+        model=found,
+        rho=rho,
+        r=r,
+        smallest_rho=answer.rho,
+        smallest_r=answer.r,
+        factor=np.nan if learn == "separate" else answer.objective,
+        margin=margin,
+        learn=learn,
+        theta=answer.theta,
+        entries=structure.entries,
+        first=1,
+        last=count,
+        held_out=None if rest is None else _try(found, rest, count + 1),
+    )
 
 
 def smallest(structure: Structure, data: Record, learn: Learn, first: Orthotope | None = None) -> WindowSolution:

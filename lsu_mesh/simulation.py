@@ -129,8 +129,8 @@ def simulate(
     for k in range(steps):
         step = k + 1
         X[k] = x
-        Y[k] = measure(model.C, model.r, x, unit_noise(noise, seed, "output", step, m))
-        x = next_state(model, x, U[k], unit_noise(noise, seed, "process", step, q))
+        Y[k] = measure(model.C, model.r, x, unit_noise(noise, seed, "output", step=step, size=m))
+        x = next_state(model, x, U[k], unit_noise(noise, seed, "process", step=step, size=q))
     return Simulation(X, Y, U)
 
 

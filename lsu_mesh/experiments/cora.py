@@ -82,7 +82,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched, folder: Pa
         "`reproduce cora --benchmarks DIR` reads them. "
         + " ".join(dict.fromkeys(b.source for b in benchmarks if b.source))
     )
-    return Outcome(tables, checks, figures, TITLE, notes, captions)
+    return Outcome(tables=tables, checks=checks, figures=figures, title=TITLE, notes=notes, captions=captions)
 
 
 def read_folder(folder: Path) -> list[Benchmark]:

@@ -78,7 +78,9 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     ways = [(kind, way) for kind in KINDS for way in FEEDBACKS]
     counts = spread(partial(_tally_of, seeds=seeds, steps=steps), ways, watch)
     tallies = dict(zip(ways, counts, strict=True))
-    return Outcome([_table(tallies, len(seeds), steps)], _checks(tallies), {}, TITLE, NOTES)
+    return Outcome(
+        tables=[_table(tallies, len(seeds), steps)], checks=_checks(tallies), figures={}, title=TITLE, notes=NOTES
+    )
 
 
 def _tally_of(way: tuple[str, str], seeds: range, steps: int) -> Tally:
@@ -104,7 +106,7 @@ def tally(kind: str, feedback: str, seeds: range, steps: int) -> Tally:
             if feedback == "same step":
                 for local in filters:
                     local.condition(Orthotope(*together.bounds))
-            _count(counts, k, made.X[k], filters, together, central)
+            _count(counts, k, made.X[k], filters=filters, together=together, central=central)
             if feedback == "next step":
                 carried = _carried(base, together, made.U[k])
             for estimator in (*filters, central):

@@ -85,7 +85,7 @@ def read_benchmark(path: Path) -> Benchmark:
         reach, center = np.abs(np.array(system["R0"]["generators"])).sum(axis=1), np.array(system["R0"]["center"])
         return Benchmark(
             name=path.stem,
-            model=LSUModel(system["A"], system["B"], system["C"], np.ones(W.shape[1]), r, noise_map=W),
+            model=LSUModel(A=system["A"], B=system["B"], C=system["C"], rho=np.ones(W.shape[1]), r=r, noise_map=W),
             prior=Orthotope(center - reach, center + reach),
             Y=np.array(system["y"], dtype=np.float64).T,
             U=np.array(system["u"], dtype=np.float64).T,

@@ -41,7 +41,7 @@ def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_gener
     strips = strips_of(other)
     if strips is not None:
         P, y, r = strips
-        cuts = _cuts(bounds, other, P, y, r)
+        cuts = _cuts(bounds, other, P, y=y, r=r)
         return _finite((body[0], *meet_strips(*body, P, np.where(cuts, y, np.nan), r)), body) if cuts.any() else body
     met = other.to_constrained_zonotope()
     if most_generators is not None and met.generator_count > most_generators:

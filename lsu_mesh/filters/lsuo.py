@@ -69,7 +69,7 @@ class LSUO(CompiledFilter):
     def _cut(self, state: Matrix, C: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
         new, status = super()._cut(state, C, y, r)
         if self.hull == "lp" and status == 0:
-            self._tighten_by_programs(state, C, y, r, new)
+            self._tighten_by_programs(state, C, y, r=r, new=new)
             crossed = np.flatnonzero(new[0] > new[1])
             status = int(np.flatnonzero(~np.isnan(y))[-1]) + 1 if crossed.size else 0
         return new, status

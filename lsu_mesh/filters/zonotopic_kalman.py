@@ -162,7 +162,7 @@ class ZonotopicKalman(Filter):
             lower, upper = _everything(c.size)
         else:
             lower, upper = np.maximum(lower, used.domain.lower), np.minimum(upper, used.domain.upper)
-        held = Held(c, H, lower, upper, _no_strips(c.size))
+        held = Held(c=c, H=H, lower=lower, upper=upper, pending=_no_strips(c.size))
         if _is_contradictory(held):
             raise InconsistentData("the prediction is proved to miss the domain")
         self._held = held
@@ -204,7 +204,13 @@ class ZonotopicKalman(Filter):
         """Go on from a zonotope and a box; in the predictor form data that wait have to be given again."""
         if not isinstance(support, Zonotope):
             raise ModelError(f"{self.kind} goes on from a zonotope, not from {support!r}")
-        self._held = Held(support.center.copy(), support.generators.copy(), lower, upper, _no_strips(lower.size))
+        self._held = Held(
+            c=support.center.copy(),
+            H=support.generators.copy(),
+            lower=lower,
+            upper=upper,
+            pending=_no_strips(lower.size),
+        )
 
     @property
     def is_resumable(self) -> bool:

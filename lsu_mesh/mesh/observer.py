@@ -98,7 +98,15 @@ class HealthObserver:
             level, reasons = "STALE", ("left the mesh", *reasons)
         elif age >= STALE_NS:
             level, reasons = "STALE", (f"no heartbeat for {age / SECOND:.1f} s", *reasons)
-        return PeerHealth(name, message.role, level, reasons, message.step, age, message.counters)
+        return PeerHealth(
+            name=name,
+            role=message.role,
+            level=level,
+            reasons=reasons,
+            step=message.step,
+            age_ns=age,
+            counters=message.counters,
+        )
 
 
 def worst(levels: Sequence[Level]) -> Level:

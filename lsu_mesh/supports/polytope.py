@@ -72,7 +72,7 @@ def enumerate_polytope(support_points: SupportPoints, n: int, surface: Surface |
     else:
         distinct = _distinct(local, np.empty((0, k)))
         points, local = points[distinct], local[distinct]
-    points, indices, volume = _refine(support_points, points, local, inverse, origin)
+    points, indices, volume = _refine(support_points, points, local, inverse=inverse, origin=origin)
     with np.errstate(over="ignore"):  # a volume may be too large for a double
         scale = abs(float(np.linalg.det(edges))) if k == n else 0.0
     return Polytope(points[indices], volume * scale)

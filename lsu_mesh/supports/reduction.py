@@ -45,7 +45,7 @@ def settle(body: Body, lower: Vector, upper: Vector, limits: Limits) -> Settled:
     c, G, A, b = body
     n = c.size
     status, program = open_program(A, b)
-    found = program_maxima(status, program, np.concatenate((G, -G)), A, b)
+    found = program_maxima(status, program, np.concatenate((G, -G)), A=A, b=b)
     if found.empty:
         return Settled(body, lower, upper, True)
     upper = np.minimum(upper, np.nextafter(c + found.values[:n], np.inf))

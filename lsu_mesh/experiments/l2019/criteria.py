@@ -74,7 +74,7 @@ def criteria(job: Job) -> dict[tuple[str, str], PerRun]:
     found: dict[tuple[str, str], PerRun] = {}
     kept: dict[str, FilterRun] = {}
     for name, (kind, options) in KINDS.items():
-        record = run_bank(kind, options, models, job.runs, data)
+        record = run_bank(kind, options, models, runs=job.runs, data=data)
         for criterion, values in of_a_filter(record, data).items():
             found[name, criterion] = values.reshape(shape)
         if name in ("LSUO", "LSUP"):

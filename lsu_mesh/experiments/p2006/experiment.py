@@ -90,7 +90,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
         "p2006-figure-1-offline": partial(draw, traces, is_online=False),
         "p2006-figure-1-online": partial(draw, traces, is_online=True),
     }
-    return Outcome(tables, checks, figures, TITLE, notes, captions)
+    return Outcome(tables=tables, checks=checks, figures=figures, title=TITLE, notes=notes, captions=captions)
 
 
 def _mean_widths(filter: WindowMAP, Y: Array, U: Array) -> Array:

@@ -87,7 +87,9 @@ def timings(seed: int) -> list[Timing]:
 def _timing(n: int, seed: int) -> Timing:
     source = np.random.default_rng([seed, n])
     orthogonal, _ = np.linalg.qr(source.standard_normal((n, n)))
-    model = LSUModel(0.9 / np.sqrt(n) * orthogonal, np.ones((n, 1)), source.standard_normal((2, n)), 0.1, 0.3)
+    model = LSUModel(
+        A=0.9 / np.sqrt(n) * orthogonal, B=np.ones((n, 1)), C=source.standard_normal((2, n)), rho=0.1, r=0.3
+    )
     data = simulate(model, TIMED_STEPS, seed)
     best = np.inf
     for _ in range(ROUNDS):

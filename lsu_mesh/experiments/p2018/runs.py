@@ -108,7 +108,7 @@ def result(job: Job) -> Result:
     record = run_filter(engine, data.Y, data.U)
     seconds = time.process_time() - began
     outputs = record.points @ model.C.T if estimator.filtered_output else record.y_points
-    return Result(statistics(record.points, record.lower, record.upper, outputs, data), seconds)
+    return Result(statistics(record.points, record.lower, record.upper, outputs=outputs, data=data), seconds)
 
 
 def statistics(points: Matrix, lower: Matrix, upper: Matrix, outputs: Matrix, data: Simulation) -> tuple[float, ...]:

@@ -85,7 +85,7 @@ def _zonotopes(model: LSUModel, prior: Orthotope, data: Simulation) -> dict[str,
 def _errors(points: Matrix, lower: Matrix, upper: Matrix, truth: Matrix) -> Errors:
     error = points - truth
     return Errors(
-        float(np.sqrt(np.square(error).mean())), float(np.abs(error).mean()), float(error.std()),
-        float(np.sqrt(np.square(error[SETTLED - 1 :]).mean())),
-        int(((lower > truth) | (upper < truth)).any(axis=1).sum()),
+        rmse=float(np.sqrt(np.square(error).mean())), mae=float(np.abs(error).mean()), std=float(error.std()),
+        settled=float(np.sqrt(np.square(error[SETTLED - 1 :]).mean())),
+        outside=int(((lower > truth) | (upper < truth)).any(axis=1).sum()),
     )  # fmt: skip

@@ -82,13 +82,15 @@ def batch_map(
     window = _window(structure, data, first)
     if not structure.has_unknown:
         return program.solve(window, point)
-    best = _at(structure.start, structure, data, widths, first, point)
+    best = _at(structure.start, structure, data, widths=widths, first=first, point=point)
     for _ in range(passes):
         theta = best.theta
         target = program.solve(window._replace(X=best.X, theta=theta), point)
         step, improved = 1.0, None
         while step >= SHORTEST_STEP and improved is None:
-            answer = _at(theta + step * (target.theta - theta), structure, data, widths, first, point)
+            answer = _at(
+                theta + step * (target.theta - theta), structure, data, widths=widths, first=first, point=point
+            )
             improved = answer if answer.objective < best.objective else None
             step *= 0.5
         if improved is None:
@@ -116,7 +118,7 @@ def _window(structure: Structure, data: Record, first: Orthotope | None) -> Wind
             lower[rows], upper[rows] = np.maximum(lower[rows], box.lower), np.minimum(upper[rows], box.upper)
     A, B = structure.known["A"], structure.known["B"]
     return WindowData(
-        data.Y, data.U, np.zeros_like(data.U), np.broadcast_to(A, (N - 1, *A.shape)),
-        np.broadcast_to(B, (N - 1, *B.shape)), lower, upper, np.clip(np.zeros((N, n)), lower, upper),
-        structure.start, True,
+        Y=data.Y, U=data.U, spread=np.zeros_like(data.U), A=np.broadcast_to(A, (N - 1, *A.shape)),
+        B=np.broadcast_to(B, (N - 1, *B.shape)), lower=lower, upper=upper, X=np.clip(np.zeros((N, n)), lower, upper),
+        theta=structure.start, is_uniform=True,
     )  # fmt: skip

@@ -65,7 +65,15 @@ class Estimates:
         """A posterior or a fused set."""
         moment = Moment(message.step, arrival_ns)
         latency = (arrival_ns - message.origin_ns) / 1e6
-        row = _Row(moment, message.lower, message.point, message.upper, message.log_volume, message.gain, latency)
+        row = _Row(
+            moment=moment,
+            lower=message.lower,
+            point=message.point,
+            upper=message.upper,
+            log_volume=message.log_volume,
+            gain=message.gain,
+            latency_ms=latency,
+        )
         self._rows[message.name].append(row)
         truth = self._truths.get(message.step)
         if truth is not None:

@@ -74,7 +74,9 @@ def read_recording(path: Path) -> Recording:
             received.append(Received(raw.arrival_ns, raw.key, raw.payload, message))
         elif gate.duplicates == duplicates:
             damaged.append(gate.last_refusal)
-    return Recording(files, description, configuration, received, damaged)
+    return Recording(
+        files=files, description=description, configuration=configuration, received=received, damaged=damaged
+    )
 
 
 def parts(path: Path) -> tuple[Path, ...]:
