@@ -22,7 +22,7 @@ def tracked(root: Path) -> list[Path]:
 
 
 def texts(tracked: list[Path]) -> list[tuple[Path, str]]:
-    return [(path, path.read_text(encoding="utf-8")) for path in tracked if path.suffix not in (".png", ".rrd")]
+    return [(path, path.read_text(encoding="utf-8")) for path in tracked if path.suffix not in (".png", ".xz")]
 
 
 def test_no_file_holds_a_path_of_a_machine_or_the_address_of_a_registry(tracked: list[Path]) -> None:
