@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import Literal, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.window.batch_map import Record, batch_map, record
@@ -20,7 +21,6 @@ from lsu_mesh.filters.window.structure import Structure, Unknown, UnknownEntries
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
 Learn = Literal["both", "r", "rho", "separate"]
 LEARN: tuple[Learn, ...] = ("both", "r", "rho", "separate")
 MAX_BROKEN = 1000
@@ -130,9 +130,20 @@ def explain(
     found = structure.model_at(answer.theta, rho, r)
     rest = Record(data.Y[count:], data.U[count:]) if len(data.Y) - count >= 2 else None
     return Explanation(
-        found, rho, r, answer.rho, answer.r, np.nan if learn == "separate" else answer.objective, margin, learn,
-        answer.theta, structure.entries, 1, count, None if rest is None else _try(found, rest, count + 1),
-    )  # fmt: skip
+        model=found,
+        rho=rho,
+        r=r,
+        smallest_rho=answer.rho,
+        smallest_r=answer.r,
+        factor=np.nan if learn == "separate" else answer.objective,
+        margin=margin,
+        learn=learn,
+        theta=answer.theta,
+        entries=structure.entries,
+        first=1,
+        last=count,
+        held_out=None if rest is None else _try(found, rest, count + 1),
+    )
 
 
 def smallest(structure: Structure, data: Record, learn: Learn, first: Orthotope | None = None) -> WindowSolution:

@@ -7,9 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.supports.support import Support
-
-Vector = NDArray[np.float64]
 
 
 def tnse(estimate: ArrayLike, truth: ArrayLike) -> float:

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.errors import ModelError
 
 if TYPE_CHECKING:
     from lsu_mesh.supports.orthotope import Orthotope
-
-Array = NDArray[np.float64]
 
 
 class LSUModel:
@@ -77,14 +76,14 @@ class LSUModel:
         if self.noise_map is not None and self.noise_map.shape[0] != n:
             problems.append(f"noise_map must have {n} rows, one per state, it has shape {self.noise_map.shape}")
         q = n if self.noise_map is None else self.noise_map.shape[1]
-        self.rho = _half_widths("rho", rho, q, "process noise", problems)
-        self.r = _half_widths("r", r, self.C.shape[0], "output", problems)
+        self.rho = _half_widths("rho", rho, q, of="process noise", problems=problems)
+        self.r = _half_widths("r", r, self.C.shape[0], of="output", problems=problems)
         self.domain = self._domain(domain, n, problems)
         p = 0 if self.B is None else self.B.shape[1]
-        self.states = _names("states", states, n, "x", problems)
-        self.inputs = _names("inputs", inputs, p, "u", problems)
-        self.outputs = _names("outputs", outputs, self.C.shape[0], "y", problems)
-        self.units = _names("units", units, n, "", problems)
+        self.states = _names("states", states, n, default="x", problems=problems)
+        self.inputs = _names("inputs", inputs, p, default="u", problems=problems)
+        self.outputs = _names("outputs", outputs, self.C.shape[0], default="y", problems=problems)
+        self.units = _names("units", units, n, default="", problems=problems)
         if problems:
             raise ModelError(*problems)
 

@@ -14,12 +14,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels import plant_step
 from lsu_mesh.model import LSUModel
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Noise = Literal["uniform", "corners"]
 
 SINE_PERIOD = 100
@@ -130,8 +129,8 @@ def simulate(
     for k in range(steps):
         step = k + 1
         X[k] = x
-        Y[k] = measure(model.C, model.r, x, unit_noise(noise, seed, "output", step, m))
-        x = next_state(model, x, U[k], unit_noise(noise, seed, "process", step, q))
+        Y[k] = measure(model.C, model.r, x, unit_noise(noise, seed, "output", step=step, size=m))
+        x = next_state(model, x, U[k], unit_noise(noise, seed, "process", step=step, size=q))
     return Simulation(X, Y, U)
 
 

@@ -1,89 +1,219 @@
-"""Arrows point down only."""
+"""Arrows point down only, between packages and inside them, and there is one circle."""
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from import_graph import circles, import_graph, imports, modules
 
-LAYERS = {
-    "lsu_mesh.errors": 0,
-    "lsu_mesh.lazy_exports": 0,
-    "lsu_mesh.kernels": 1,
-    "lsu_mesh.supports": 2,
-    "lsu_mesh.model": 3,
-    "lsu_mesh.systems": 4,
-    "lsu_mesh.simulation": 4,
-    "lsu_mesh.metrics": 4,
-    "lsu_mesh.filters": 5,
-    "lsu_mesh.fusion": 5,
-    "lsu_mesh.identification": 6,
-    "lsu_mesh.experiments": 6,
-    "lsu_mesh.mesh": 7,
-    "lsu_mesh_services": 8,
+REST = "*"
+"""All files of the package that no layer names."""
+LAYERS: dict[str, list[tuple[str, ...]]] = {
+    "lsu_mesh": [
+        ("errors", "array_types", "lazy_exports"),
+        ("kernels",),
+        ("supports",),
+        ("model",),
+        ("systems", "simulation", "metrics"),
+        ("filters", "fusion"),
+        ("identification", "testing"),
+        ("experiments", "mesh"),
+    ],
+    "lsu_mesh.kernels": [
+        ("runtime",),
+        ("linear_programs", "parallelotopes", "zonotopes"),
+        ("filter_step", "plant_step"),
+        ("batch_run",),
+    ],
+    "lsu_mesh.kernels.runtime": [("compile", "unowned_views"), (REST,)],
+    "lsu_mesh.kernels.linear_programs": [
+        ("banded_program", "bordered_systems", "dual_bound", "simplex"),
+        ("newton_step", "safe_maxima"),
+        ("interior_point", "vertex_enumeration"),
+        ("window_program",),
+    ],
+    "lsu_mesh.kernels.parallelotopes": [
+        ("strip_update", "edge_selection", "enclosure"),
+        ("box", "parallelotope"),
+        ("bundle",),
+    ],
+    "lsu_mesh.kernels.zonotopes": [
+        ("zonotope", "lifted_zonotope"),
+        ("constrained_zonotope", "constraint_elimination", "generator_reduction", "time_update"),
+        ("complexity_reduction", "zonotopic_kalman"),
+    ],
+    "lsu_mesh.supports": [
+        ("arrays", "exact", "exact_program", "polytope"),
+        ("linear_programs",),
+        ("reduction",),
+        (REST,),
+        ("intersection",),
+    ],
+    "lsu_mesh.filters": [
+        ("filter", "validation", "inconsistency", "transfer_gain"),
+        ("compiled", "constrained_intersection", "window"),
+        (REST,),
+        ("registry", "run"),
+        ("bank", "warm_up"),
+    ],
+    "lsu_mesh.filters.window": [
+        ("structure", "interval_estimate", "highs"),
+        ("program",),
+        ("state",),
+        ("batch_map", "window_map"),
+    ],
+    "lsu_mesh.fusion": [("intersection",), (REST,), ("policies",), ("fuse",)],
+    "lsu_mesh.mesh": [
+        ("keys", "messages", "ledger", "unknown_fields"),
+        ("message_examples", "sets"),
+        ("config",),
+        ("access", "admission", "model_answer", "grid", "data_files"),
+        ("flows",),
+        ("estimation",),
+        ("nodes",),
+        ("observer", "replay", "verification"),
+        ("simulator",),
+    ],
+    "lsu_mesh.mesh.config": [
+        ("table", "settings", "write", "measurement_files"),
+        (REST,),
+        ("load",),
+    ],
+    "lsu_mesh.mesh.nodes": [
+        ("node", "schedule"),
+        ("rate_limit", "source_timeout"),
+        (REST,),
+        ("filter", "fusion"),
+    ],
+    "lsu_mesh.mesh.verification": [("archive",), ("provenance_steps", "containment"), (REST,), ("verify",)],
+    "lsu_mesh.mesh.simulator": [
+        ("broken", "faults", "decoding", "recorder"),
+        (REST,),
+        ("mesh",),
+        ("run",),
+        ("campaign",),
+    ],
+    "lsu_mesh.experiments": [
+        ("outcome", "effect", "workers", "transfer_result"),
+        ("comparison", "monte_carlo", "page"),
+        (REST,),
+    ],
+    "lsu_mesh_services": [
+        ("exit_codes", "extras", "stop", "supervisor"),
+        ("options",),
+        ("network",),
+        ("bus",),
+        ("session", "configuration"),
+        ("recording", "monitoring"),
+        ("viewers", "peer", "recorder"),
+        ("mesh_launcher",),
+        ("replay",),
+        ("commands",),
+        ("cli",),
+        ("__main__",),
+    ],
+    "lsu_mesh_services.options": [("parsing",), (REST,)],
+    "lsu_mesh_services.network": [("access_control",), (REST,)],
+    "lsu_mesh_services.recording": [
+        ("entity_paths", "timeline", "palette", "repair", "timeout", "set_geometry", "synthetic_mesh"),
+        ("bands", "raw", "frame"),
+        ("read", "blueprint", REST),
+        ("stream",),
+        ("recorder", "export", "summary"),
+        ("cost",),
+    ],
 }
-"""A module imports only from its own layer (and package) and from those below."""
-FACADE = "lsu_mesh"
+"""From the lowest layer to the highest; a module imports from its own layer and from those below.
+
+A package that stands here names each of its files and folders, or says where the rest belongs. Inside a layer, and
+inside a package that does not stand here, the files import each other in any order that makes no circle.
+"""
+CIRCLE = {f"lsu_mesh.supports.{name}" for name in (
+    "constrained_zonotope", "orthotope", "parallelotope", "support", "zonotope",
+)}  # fmt: skip
+"""Each set converts itself into the others, which is what their one contract asks of them."""
 
 
-def modules(root: Path) -> Iterator[tuple[str, Path]]:
-    for home, package in ((root, "lsu_mesh"), (root / "services", "lsu_mesh_services")):
-        for path in sorted((home / package).rglob("*.py")):
-            parts = path.relative_to(home).with_suffix("").parts
-            yield ".".join(parts[:-1] if parts[-1] == "__init__" else parts), path
+@pytest.fixture(scope="module")
+def graph(root: Path) -> dict[str, set[str]]:
+    return import_graph(modules(root))
 
 
-def imports(path: Path, *, runtime: bool) -> set[str]:
-    """Full names that a file imports; with ``runtime`` without those for type checkers only."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    skipped = {
-        child
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-        for child in ast.walk(node)
-    }
-    found = set()
-    for node in ast.walk(tree):
-        if runtime and node in skipped:
-            continue
-        if isinstance(node, ast.Import):
-            found |= {name.name for name in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found |= {node.module} | {f"{node.module}.{name.name}" for name in node.names}
-    return found
+def layer_of(package: str, module: str) -> int | None:
+    """The layer of the file or folder of the package in which the module lies."""
+    part = module.removeprefix(f"{package}.").split(".")[0]
+    layers = LAYERS[package]
+    named = next((i for i, layer in enumerate(layers) if part in layer), None)
+    return named if named is not None else next((i for i, layer in enumerate(layers) if REST in layer), None)
 
 
-def package_of(module: str) -> str | None:
-    """The layer's package that a module belongs to."""
-    return next((name for name in LAYERS if module == name or module.startswith(f"{name}.")), None)
+def test_every_module_has_a_place_in_the_house(graph: dict[str, set[str]]) -> None:
+    homeless = [
+        f"{module}: give it a layer of {package} in tests/test_architecture.py"
+        for package in LAYERS
+        for module in graph
+        if module.startswith(f"{package}.") and layer_of(package, module) is None
+    ]
+    assert homeless == []
 
 
-def test_every_module_has_a_place_in_the_house(root: Path) -> None:
-    assert [name for name, _ in modules(root) if package_of(name) is None and name != FACADE] == []
-
-
-def test_arrows_point_down_only(root: Path) -> None:
-    wrong = []
-    for name, path in modules(root):
-        own = package_of(name)
-        if own is None:
-            continue
-        for imported in imports(path, runtime=True):
-            other = package_of(imported)
-            if other is None or other == own:
-                continue
-            if LAYERS[other] >= LAYERS[own] and not (own == "lsu_mesh.model" and other == "lsu_mesh.supports"):
-                wrong.append(f"{name} imports {imported}")
+def test_arrows_point_down_only(graph: dict[str, set[str]]) -> None:
+    wrong = [
+        f"{module} imports {imported}"
+        for package in LAYERS
+        for module in graph
+        for imported in graph[module]
+        if module.startswith(f"{package}.") and imported.startswith(f"{package}.")
+        if (layer_of(package, imported) or 0) > (layer_of(package, module) or 0)
+    ]
     assert wrong == []
 
 
+def test_there_is_one_circle(graph: dict[str, set[str]]) -> None:
+    assert circles(graph) == [CIRCLE]
+
+
+def test_a_circle_is_found() -> None:
+    graph = {"a": {"b"}, "b": {"c", "d"}, "c": {"a"}, "d": set(), "e": {"d", "f"}, "f": {"e"}}
+    assert sorted(map(sorted, circles(graph))) == [["a", "b", "c"], ["e", "f"]]
+
+
+def test_an_arrow_up_is_found() -> None:
+    assert layer_of("lsu_mesh", "lsu_mesh.kernels.runtime.compile") == 1
+    assert layer_of("lsu_mesh.kernels", "lsu_mesh.kernels.runtime.compile") == 0
+    assert layer_of("lsu_mesh.kernels", "lsu_mesh.kernels.unheard_of") is None
+
+
+def test_folders_of_papers_do_not_import_each_other(graph: dict[str, set[str]]) -> None:
+    def paper(module: str) -> str | None:
+        parts = module.split(".")
+        return parts[2] if parts[:2] == ["lsu_mesh", "experiments"] and len(parts) > 3 else None
+
+    shared = [
+        f"{module} imports {imported}"
+        for module in graph
+        for imported in graph[module]
+        if paper(module) and paper(imported) and paper(module) != paper(imported)
+    ]
+    assert shared == []
+
+
+def test_types_of_arrays_have_one_home(root: Path) -> None:
+    elsewhere = [
+        f"{name}: {line}"
+        for name, path in modules(root).items()
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if line[:1].isupper() and " = NDArray[" in line and name != "lsu_mesh.array_types"
+    ]
+    assert elsewhere == []
+
+
 def test_the_library_imports_neither_zenoh_nor_rerun_nor_messagepack(root: Path) -> None:
-    for name, path in modules(root):
-        tops = {imported.split(".")[0] for imported in imports(path, runtime=False)}
+    for name, path in modules(root).items():
+        tops = {imported.split(".")[0] for imported in imports(path)}
         if name.partition(".")[0] == "lsu_mesh":
             assert not tops & {"zenoh", "rerun", "lsu_mesh_services", "rich"}, name
         if name.startswith("lsu_mesh.") and not name.startswith("lsu_mesh.mesh"):
@@ -91,8 +221,8 @@ def test_the_library_imports_neither_zenoh_nor_rerun_nor_messagepack(root: Path)
 
 
 def test_only_the_bus_imports_zenoh_and_only_the_recording_imports_rerun(root: Path) -> None:
-    for name, path in modules(root):
-        tops = {imported.split(".")[0] for imported in imports(path, runtime=False)}
+    for name, path in modules(root).items():
+        tops = {imported.split(".")[0] for imported in imports(path)}
         assert ("zenoh" in tops) <= (name == "lsu_mesh_services.bus"), name
         assert ("rerun" in tops) <= name.startswith("lsu_mesh_services.recording"), name
 

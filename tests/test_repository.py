@@ -22,7 +22,7 @@ def tracked(root: Path) -> list[Path]:
 
 
 def texts(tracked: list[Path]) -> list[tuple[Path, str]]:
-    return [(path, path.read_text(encoding="utf-8")) for path in tracked if path.suffix not in (".png", ".rrd")]
+    return [(path, path.read_text(encoding="utf-8")) for path in tracked if path.suffix not in (".png", ".xz")]
 
 
 def test_no_file_holds_a_path_of_a_machine_or_the_address_of_a_registry(tracked: list[Path]) -> None:
@@ -55,6 +55,48 @@ def test_every_link_of_the_pages_leads_somewhere(root: Path) -> None:
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-def test_no_python_file_grows_past_what_one_can_read(tracked: list[Path]) -> None:
-    long = {path.name: len(text.splitlines()) for path, text in texts(tracked) if path.suffix == ".py"}
-    assert {name: lines for name, lines in long.items() if lines > 500} == {}
+MAX_LINES = 400
+MAY_BE_LONGER = {"lsu_mesh/mesh/messages.py"}
+"""All messages of the protocol stand side by side."""
+
+
+def test_no_python_file_grows_past_what_one_can_read(tracked: list[Path], root: Path) -> None:
+    long = {
+        path.relative_to(root).as_posix(): len(text.splitlines())
+        for path, text in texts(tracked)
+        if path.suffix == ".py" and len(text.splitlines()) > MAX_LINES
+    }
+    assert {name: lines for name, lines in long.items() if name not in MAY_BE_LONGER} == {}
+
+
+MIRRORED = {"services": "services/lsu_mesh_services"}
+"""Folders of tests that are named otherwise than what they test."""
+NO_MIRROR = {"live", "docker", "examples", "data"}
+"""Folders of tests of the whole, and of what tests read."""
+
+
+def test_tests_mirror_the_tree(root: Path) -> None:
+    tests = root / "tests"
+    strays = []
+    for folder in sorted({path.parent.relative_to(tests) for path in tests.rglob("test_*.py")}):
+        first, *below = folder.parts or (".",)
+        if first not in NO_MIRROR and not (root / MIRRORED.get(first, f"lsu_mesh/{first}")).joinpath(*below).is_dir():
+            strays.append(f"tests/{folder}: {MIRRORED.get(first, 'lsu_mesh/' + first)} has no such folder")
+    assert strays == []
+
+
+def test_a_test_lies_where_the_file_lies_after_which_it_is_named(root: Path) -> None:
+    tests = root / "tests"
+    homes: dict[str, set[str]] = {}
+    for base, mirror in ((root / "lsu_mesh", tests), (root / "services" / "lsu_mesh_services", tests / "services")):
+        for path in base.rglob("*.py"):
+            home = (mirror / path.parent.relative_to(base)).relative_to(tests)
+            name = path.parent.name if path.stem == "__init__" else path.stem
+            homes.setdefault(name, set()).add(home.as_posix())
+    misplaced = [
+        f"tests/{folder}/{path.name}: expected in {sorted(homes[name])}"
+        for path in sorted(tests.rglob("test_*.py"))
+        if (folder := path.parent.relative_to(tests).as_posix()).split("/")[0] not in NO_MIRROR
+        if (name := path.stem.removeprefix("test_")) in homes and folder not in homes[name]
+    ]
+    assert misplaced == []

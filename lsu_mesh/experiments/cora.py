@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.experiments.outcome import NOTHING, Cell, Check, Column, Outcome, Table
 from lsu_mesh.experiments.tightness import FILTERS, Benchmark, fits, read_benchmark
@@ -20,8 +20,6 @@ from lsu_mesh.filters.filter import Filter
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Box = tuple[Vector, Vector]
 
 TITLE = "Althoff, Rath (2021): Comparison of guaranteed state estimators, Automatica 130; numbers of the CORA toolbox"
@@ -84,7 +82,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched, folder: Pa
         "`reproduce cora --benchmarks DIR` reads them. "
         + " ".join(dict.fromkeys(b.source for b in benchmarks if b.source))
     )
-    return Outcome(tables, checks, figures, TITLE, notes, captions)
+    return Outcome(tables=tables, checks=checks, figures=figures, title=TITLE, notes=notes, captions=captions)
 
 
 def read_folder(folder: Path) -> list[Benchmark]:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Vector
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
 from lsu_mesh.experiments.workers import Watch, spread, unwatched
 from lsu_mesh.filters.filter import Filter
@@ -29,7 +29,6 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import simulate
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
 Make = Callable[[LSUModel, Orthotope], Filter]
 
 C = ((1.0, 0.0, 0.5), (0.0, 1.0, 0.5), (1.0, -1.0, 0.3))
@@ -79,7 +78,9 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     ways = [(kind, way) for kind in KINDS for way in FEEDBACKS]
     counts = spread(partial(_tally_of, seeds=seeds, steps=steps), ways, watch)
     tallies = dict(zip(ways, counts, strict=True))
-    return Outcome([_table(tallies, len(seeds), steps)], _checks(tallies), {}, TITLE, NOTES)
+    return Outcome(
+        tables=[_table(tallies, len(seeds), steps)], checks=_checks(tallies), figures={}, title=TITLE, notes=NOTES
+    )
 
 
 def _tally_of(way: tuple[str, str], seeds: range, steps: int) -> Tally:
@@ -105,7 +106,7 @@ def tally(kind: str, feedback: str, seeds: range, steps: int) -> Tally:
             if feedback == "same step":
                 for local in filters:
                     local.condition(Orthotope(*together.bounds))
-            _count(counts, k, made.X[k], filters, together, central)
+            _count(counts, k, made.X[k], filters=filters, together=together, central=central)
             if feedback == "next step":
                 carried = _carried(base, together, made.U[k])
             for estimator in (*filters, central):

@@ -11,14 +11,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Stack
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation, generator
-
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
 
 
 class Draws(NamedTuple):
@@ -65,8 +62,8 @@ def simulate_all(models: Sequence[LSUModel], draws: Draws, spread_of_start: floa
     x = np.broadcast_to(spread_of_start * draws.start, (count, runs, n))
     for k in range(steps):
         X[:, :, k] = x
-        Y[:, :, k] = _noisy(C, x, np.zeros((len(C), 0)), np.zeros((runs, 0)), draws.output[:, k], r)
-        x = _noisy(A, x, B, draws.inputs[:, k], draws.process[:, k], rho)
+        Y[:, :, k] = _noisy(C, x, np.zeros((len(C), 0)), u=np.zeros((runs, 0)), unit=draws.output[:, k], half_widths=r)
+        x = _noisy(A, x, B, u=draws.inputs[:, k], unit=draws.process[:, k], half_widths=rho)
     U = np.broadcast_to(draws.inputs, (count, *draws.inputs.shape))
     return Simulation(*(table.reshape(count * runs, steps, -1) for table in (X, Y, U)))
 

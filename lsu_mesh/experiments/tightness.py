@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
@@ -26,9 +26,6 @@ from lsu_mesh.filters.lsupb import LSUPB
 from lsu_mesh.filters.zonotopic_kalman import ZonotopicKalman
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 FILTERS: dict[str, Callable[[LSUModel, Orthotope], Filter]] = {
     "LSUO": LSUO,
@@ -88,7 +85,7 @@ def read_benchmark(path: Path) -> Benchmark:
         reach, center = np.abs(np.array(system["R0"]["generators"])).sum(axis=1), np.array(system["R0"]["center"])
         return Benchmark(
             name=path.stem,
-            model=LSUModel(system["A"], system["B"], system["C"], np.ones(W.shape[1]), r, noise_map=W),
+            model=LSUModel(A=system["A"], B=system["B"], C=system["C"], rho=np.ones(W.shape[1]), r=r, noise_map=W),
             prior=Orthotope(center - reach, center + reach),
             Y=np.array(system["y"], dtype=np.float64).T,
             U=np.array(system["u"], dtype=np.float64).T,

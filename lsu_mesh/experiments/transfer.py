@@ -14,9 +14,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.experiments.fusion import Make
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
@@ -34,7 +34,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Vector = NDArray[np.float64]
 
 KINDS: Mapping[str, Make] = {
     "LSUO lp": lambda model, prior: LSUO(model, prior, hull="lp"),
@@ -108,15 +107,25 @@ def result(system: str, kind: str, way: str, ratio: float, seeds: Iterable[int],
     """One point of the curves."""
     sums = Sums()
     for seed in seeds:
-        _simulate(sums, system, kind, way, ratio, seed, steps)
+        _simulate(sums, system, kind, way=way, ratio=ratio, seed=seed, steps=steps)
     widths, isolated = np.array(sums.widths), np.array(sums.isolated)
     shares = widths.mean(axis=0) / isolated.mean(axis=0)
     total = tnse(sums.points, sums.truth)
     return Result(
-        system, kind, way, ratio, float(shares.mean()), float(shares.max()), float((widths / isolated).max()),
-        total, total / tnse(sums.isolated_points, sums.truth), float(np.mean(sums.gains)),
-        float(np.mean(sums.held)), sums.rejected / len(widths), sums.restarts / len(widths),
-    )  # fmt: skip
+        system=system,
+        kind=kind,
+        way=way,
+        ratio=ratio,
+        width=float(shares.mean()),
+        widest=float(shares.max()),
+        worst_step=float((widths / isolated).max()),
+        tnse=total,
+        tnse_ratio=total / tnse(sums.isolated_points, sums.truth),
+        gain=float(np.mean(sums.gains)),
+        inside=float(np.mean(sums.held)),
+        rejected=sums.rejected / len(widths),
+        restarts=sums.restarts / len(widths),
+    )
 
 
 def _simulate(sums: Sums, system: str, kind: str, way: str, ratio: float, seed: int, steps: int) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Flags, Matrix, Stack
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.run import FilterRun
@@ -18,10 +19,6 @@ from lsu_mesh.kernels import batch_run
 from lsu_mesh.kernels.runtime.scratch import scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.support import Support
-
-Stack = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 MIN_SHARE = 64
 """Instances below which a thread of its own does not pay."""

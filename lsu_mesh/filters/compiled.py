@@ -7,8 +7,9 @@ from abc import abstractmethod
 from typing import ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
@@ -25,9 +26,6 @@ from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class CompiledFilter(Filter):
@@ -174,11 +172,13 @@ class CompiledFilter(Filter):
 
     def _cut(self, state: Matrix, P: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
         """The part of ``state`` in the strips ``|y − P x| ≤ r``, and the status of the kernel."""
-        return self._restrict(filter_step.UPDATE, state, P, y, r)
+        return self._restrict(filter_step.UPDATE, state, P, first=y, second=r)
 
     def _meet_box(self, state: Matrix, box: Orthotope) -> tuple[Matrix, int]:
         """The part of ``state`` in a box, and the status of the kernel."""
-        return self._restrict(filter_step.MEET_BOX, state, self._arrays.C, np.array(box.lower), np.array(box.upper))
+        return self._restrict(
+            filter_step.MEET_BOX, state, self._arrays.C, first=np.array(box.lower), second=np.array(box.upper)
+        )
 
     def _restrict(self, action: int, state: Matrix, P: Matrix, first: Vector, second: Vector) -> tuple[Matrix, int]:
         new = np.empty_like(state)
@@ -211,7 +211,11 @@ class CompiledFilter(Filter):
         """Names the strips up to the one that proved the contradiction."""
         interval = self._predict_output(r)
         return strip_contradiction(
-            self._model.outputs[:status], interval.lower[:status], interval.upper[:status], y[:status], np.zeros(status)
+            self._model.outputs[:status],
+            interval.lower[:status],
+            interval.upper[:status],
+            y=y[:status],
+            r=np.zeros(status),
         )
 
 

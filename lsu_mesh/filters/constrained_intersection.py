@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_sets, meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box
 from lsu_mesh.supports.arrays import are_finite
@@ -18,9 +19,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.reduction import Body
 from lsu_mesh.supports.support import Support
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_generators: int | None) -> Body:
@@ -43,7 +41,7 @@ def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_gener
     strips = strips_of(other)
     if strips is not None:
         P, y, r = strips
-        cuts = _cuts(bounds, other, P, y, r)
+        cuts = _cuts(bounds, other, P, y=y, r=r)
         return _finite((body[0], *meet_strips(*body, P, np.where(cuts, y, np.nan), r)), body) if cuts.any() else body
     met = other.to_constrained_zonotope()
     if most_generators is not None and met.generator_count > most_generators:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
-
-Vector = NDArray[np.float64]
 
 
 def strip_contradiction(names: Sequence[str], low: Vector, high: Vector, y: Vector, r: Vector) -> InconsistentData:

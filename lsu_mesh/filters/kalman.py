@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import ClassVar, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
 from lsu_mesh.filters.transfer_gain import hull_gain
@@ -21,9 +22,6 @@ from lsu_mesh.filters.validation import (
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class Gaussian(NamedTuple):

@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
 from lsu_mesh.filters.filter import Filter, OutputPrediction
@@ -30,7 +31,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.reduction import Body, Limits, settle
 from lsu_mesh.supports.support import Support
 
-Vector = NDArray[np.float64]
 LITTLE_GAIN = 0.03
 """Nats below which a transferred set is weighed against what the reduction of the intersection costs."""
 

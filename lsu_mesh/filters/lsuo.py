@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class LSUO(CompiledFilter):
@@ -71,7 +69,7 @@ class LSUO(CompiledFilter):
     def _cut(self, state: Matrix, C: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
         new, status = super()._cut(state, C, y, r)
         if self.hull == "lp" and status == 0:
-            self._tighten_by_programs(state, C, y, r, new)
+            self._tighten_by_programs(state, C, y, r=r, new=new)
             crossed = np.flatnonzero(new[0] > new[1])
             status = int(np.flatnonzero(~np.isnan(y))[-1]) + 1 if crossed.size else 0
         return new, status

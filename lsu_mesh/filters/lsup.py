@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.kernels import filter_step
@@ -15,8 +16,6 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 TimeUpdate = Literal["image", "cgz", "edges", "strips"]
 
 TIME_UPDATES: dict[str, int] = {

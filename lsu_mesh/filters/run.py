@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, LsuMeshError, ModelError, UnboundedSupport
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.kernels import batch_run
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 
 class FilterRun(NamedTuple):
@@ -52,8 +50,8 @@ def run_filter(filter: Filter, Y: ArrayLike, U: ArrayLike | None = None) -> Filt
     inputs = _inputs(U, len(outputs), filter.model.input_count)
     n, m, rows = filter.model.state_count, filter.model.output_count, len(outputs)
     run = FilterRun(
-        np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n)), np.empty(rows),
-        np.empty((rows, m)), np.empty((rows, m)), np.empty((rows, m)),
+        points=np.empty((rows, n)), lower=np.empty((rows, n)), upper=np.empty((rows, n)), volumes=np.empty(rows),
+        y_lower=np.empty((rows, m)), y_upper=np.empty((rows, m)), y_points=np.empty((rows, m)),
     )  # fmt: skip
     if isinstance(filter, CompiledFilter) and filter.has_compiled_loop:
         row, where = filter.sweep(outputs, inputs, batch_run.Record(*(table[np.newaxis] for table in run)))

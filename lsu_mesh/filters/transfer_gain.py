@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Vector = NDArray[np.float64]
+from lsu_mesh.array_types import Vector
 
 
 def hull_gain(before: tuple[Vector, Vector], after: tuple[Vector, Vector]) -> float:

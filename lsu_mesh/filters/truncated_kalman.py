@@ -6,15 +6,15 @@ import math
 from typing import ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.kalman import Gaussian, Kalman
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
-Vector = NDArray[np.float64]
 NARROW = 1e-4
 """An interval narrower than this is one of a uniform density: the formula would lose all digits."""
 ROOT_2 = math.sqrt(2.0)

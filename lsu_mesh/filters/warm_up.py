@@ -48,7 +48,7 @@ def warm_up() -> float:
     prior = Orthotope([-1.0, -1.0], [1.0, 1.0])
     domain = Orthotope([-1.5, -1.5], [1.5, 1.5])
     for noise_map in (None, [[1.0], [0.5]]):
-        model = LSUModel(A, B, C, 0.05, 0.1, noise_map=noise_map, domain=domain)
+        model = LSUModel(A=A, B=B, C=C, rho=0.05, r=0.1, noise_map=noise_map, domain=domain)
         data = simulate(model, STEPS, seed=1)
         for kind in FILTERS:
             for options in OPTIONS.get(kind, ({},)):
@@ -68,7 +68,7 @@ def _compile_in_processes() -> None:
 
 def _compile_share(share: str) -> None:
     """The steps of these filters alone, in the loop where they have one."""
-    model = LSUModel(np.eye(2), np.eye(2), np.eye(2), 0.05, 0.1, domain=([-9.0, -9.0], [9.0, 9.0]))
+    model = LSUModel(A=np.eye(2), B=np.eye(2), C=np.eye(2), rho=0.05, r=0.1, domain=([-9.0, -9.0], [9.0, 9.0]))
     for kind in SHARES[share]:
         for options in OPTIONS.get(kind, ({},)):
             if share == "step" and "hull" in options:

@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
@@ -28,9 +29,6 @@ from lsu_mesh.supports.linear_programs import is_proved_empty
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class Strips(NamedTuple):
@@ -164,7 +162,7 @@ class ZonotopicKalman(Filter):
             lower, upper = _everything(c.size)
         else:
             lower, upper = np.maximum(lower, used.domain.lower), np.minimum(upper, used.domain.upper)
-        held = Held(c, H, lower, upper, _no_strips(c.size))
+        held = Held(c=c, H=H, lower=lower, upper=upper, pending=_no_strips(c.size))
         if _is_contradictory(held):
             raise InconsistentData("the prediction is proved to miss the domain")
         self._held = held
@@ -206,7 +204,13 @@ class ZonotopicKalman(Filter):
         """Go on from a zonotope and a box; in the predictor form data that wait have to be given again."""
         if not isinstance(support, Zonotope):
             raise ModelError(f"{self.kind} goes on from a zonotope, not from {support!r}")
-        self._held = Held(support.center.copy(), support.generators.copy(), lower, upper, _no_strips(lower.size))
+        self._held = Held(
+            c=support.center.copy(),
+            H=support.generators.copy(),
+            lower=lower,
+            upper=upper,
+            pending=_no_strips(lower.size),
+        )
 
     @property
     def is_resumable(self) -> bool:

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.supports.arrays import frozen
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.support import Support
-
-Vector = NDArray[np.float64]
 
 
 class Fusion(NamedTuple):

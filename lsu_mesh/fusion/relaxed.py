@@ -13,15 +13,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.fusion.intersection import Fusion, fuse_all
 from lsu_mesh.supports.arrays import frozen
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
-Vector = NDArray[np.float64]
 Box = tuple[Vector, Vector]
 
 MAX_FAMILIES = 256

@@ -7,14 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Stack
 from lsu_mesh.kernels.filter_step import MEET_BOX, PREDICT, UPDATE, advance, copy, describe, predict_output
 from lsu_mesh.kernels.runtime.compile import inlined, kernel
 from lsu_mesh.kernels.runtime.scratch import Scratch, spare_state
 from lsu_mesh.kernels.runtime.unowned_views import borrowed
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
-Stack = NDArray[np.float64]
 
 DONE = 0
 IN_UPDATE = 1

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes import box, parallelotope
 from lsu_mesh.kernels.parallelotopes.bundle import shrink, tighten_all, tighten_each_other
 from lsu_mesh.kernels.parallelotopes.parallelotope import STRIPS, cut_all
@@ -21,9 +19,6 @@ from lsu_mesh.kernels.runtime.compile import inlined, kernel
 from lsu_mesh.kernels.runtime.linear_algebra import log_abs_determinant
 from lsu_mesh.kernels.runtime.scratch import BUNDLE as BUNDLE_ROW
 from lsu_mesh.kernels.runtime.scratch import FACTOR, IDENTITY, Scratch, row, square
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 BOX = 0
 PARALLELOTOPE = 1

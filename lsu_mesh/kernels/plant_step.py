@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import kernel
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 
 @kernel

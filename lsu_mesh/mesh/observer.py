@@ -103,10 +103,10 @@ class HealthObserver:
         elif age >= STALE_NS:
             level, reasons = "STALE", (f"no heartbeat for {age / SECOND:.1f} s", *reasons)
         return PeerHealth(
-            name,
-            message.role,
-            level,
-            reasons,
+            name=name,
+            role=message.role,
+            level=level,
+            reasons=reasons,
             step=message.step,
             age_ns=age,
             counters=message.counters,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.mesh.messages import (
     ConstrainedZonotopeMessage,
     IntersectionMessage,
@@ -16,7 +17,7 @@ from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
-from lsu_mesh.supports.support import Matrix, Support, Vector
+from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
 
 

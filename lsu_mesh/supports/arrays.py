@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.errors import ModelError
-
-Array = NDArray[np.float64]
 
 MAX_EDGES = 16
 """A box with more edge directions has more than 65 536 corners: they are not enumerated."""

@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.kernels.linear_programs.safe_maxima import open_program
 from lsu_mesh.kernels.linear_programs.vertex_enumeration import split_triangles
@@ -19,7 +20,7 @@ from lsu_mesh.supports.exact import Membership
 from lsu_mesh.supports.exact_program import exact_solution
 from lsu_mesh.supports.linear_programs import is_proved_empty, safe_maxima
 from lsu_mesh.supports.polytope import Polytope, enumerate_polytope
-from lsu_mesh.supports.support import Matrix, Support, Vector
+from lsu_mesh.supports.support import Support
 
 MAX_POINTS = 2000
 """Vertices that are looked for in one go in three dimensions; those beyond are found in rounds."""

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 from numpy.typing import NDArray
 
-from lsu_mesh.supports.support import Matrix, Vector
+from lsu_mesh.array_types import Matrix, Vector
 
 Row = list[Fraction]
 

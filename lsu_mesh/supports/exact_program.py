@@ -34,7 +34,7 @@ def exact_solution(
         entering = _entering(rows, at, beyond)
         if entering is None:
             return None
-        _step(rows, basis, at, level, beyond, entering)
+        _step(rows, basis, at, level=level, beyond=beyond, j=entering)
 
 
 def _reduce(rows: list[Row], order: Sequence[int]) -> list[int]:

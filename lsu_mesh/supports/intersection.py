@@ -8,10 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.supports.arrays import frozen
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
-from lsu_mesh.supports.support import Matrix, Support, Vector
+from lsu_mesh.supports.support import Support
 
 
 class Intersection(Support):

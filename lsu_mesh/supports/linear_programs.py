@@ -9,14 +9,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.linear_programs.dual_bound import absolute_row_sums, dual_bound
 from lsu_mesh.kernels.linear_programs.safe_maxima import EMPTY, LOOSE, Program, maxima, open_program
 from lsu_mesh.supports.arrays import are_finite
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class Maxima(NamedTuple):

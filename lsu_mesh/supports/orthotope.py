@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels.runtime.rounding import EPSILON, UNDERFLOW
 from lsu_mesh.supports.arrays import box_volume, corners_are_few, finite_array
-from lsu_mesh.supports.support import Matrix, Support, Vector
+from lsu_mesh.supports.support import Support
 
 if TYPE_CHECKING:
     from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope

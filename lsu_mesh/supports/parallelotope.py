@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.kernels.parallelotopes import parallelotope, strip_update
@@ -17,7 +18,7 @@ from lsu_mesh.kernels.runtime import linear_algebra
 from lsu_mesh.kernels.runtime.scratch import scratch
 from lsu_mesh.supports.arrays import corners_are_few, finite_array, frozen
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
-from lsu_mesh.supports.support import Matrix, Support, Vector
+from lsu_mesh.supports.support import Support
 
 if TYPE_CHECKING:
     from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope

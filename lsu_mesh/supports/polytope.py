@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 SupportPoints = Callable[[Matrix], Matrix]
 """Directions (k, n) → a point of the set (k, n) that is farthest in each."""
 Surface = Callable[[Matrix, Vector, Matrix], Matrix]
@@ -73,7 +72,7 @@ def enumerate_polytope(support_points: SupportPoints, n: int, surface: Surface |
     else:
         distinct = _distinct(local, np.empty((0, k)))
         points, local = points[distinct], local[distinct]
-    points, indices, volume = _refine(support_points, points, local, inverse, origin)
+    points, indices, volume = _refine(support_points, points, local, inverse=inverse, origin=origin)
     with np.errstate(over="ignore"):  # a volume may be too large for a double
         scale = abs(float(np.linalg.det(edges))) if k == n else 0.0
     return Polytope(points[indices], volume * scale)

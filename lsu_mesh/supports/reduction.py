@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.linear_programs.safe_maxima import open_program, variable_ranges
 from lsu_mesh.kernels.zonotopes.complexity_reduction import reduce_complexity
 from lsu_mesh.supports.linear_programs import program_maxima
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Body = tuple[Vector, Matrix, Matrix, Vector]
 
 
@@ -47,7 +45,7 @@ def settle(body: Body, lower: Vector, upper: Vector, limits: Limits) -> Settled:
     c, G, A, b = body
     n = c.size
     status, program = open_program(A, b)
-    found = program_maxima(status, program, np.concatenate((G, -G)), A, b)
+    found = program_maxima(status, program, np.concatenate((G, -G)), A=A, b=b)
     if found.empty:
         return Settled(body, lower, upper, True)
     upper = np.minimum(upper, np.nextafter(c + found.values[:n], np.inf))

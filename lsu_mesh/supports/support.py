@@ -6,15 +6,13 @@ import math
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from lsu_mesh.array_types import Matrix, Vector
 
 if TYPE_CHECKING:
     from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
     from lsu_mesh.supports.orthotope import Orthotope
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class Support(ABC):

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels.zonotopes.zonotope import (
     absorb_box,
@@ -17,7 +18,7 @@ from lsu_mesh.kernels.zonotopes.zonotope import (
 )
 from lsu_mesh.supports.arrays import box_volume, finite_array, frozen, map_arguments
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
-from lsu_mesh.supports.support import Matrix, Support, Vector
+from lsu_mesh.supports.support import Support
 
 MAX_SUM = 500_000
 """Determinants that :meth:`Zonotope.volume` is ready to sum."""

@@ -121,7 +121,17 @@ def _run_mesh(configuration: Configuration, options: argparse.Namespace, player:
         recording = None if options.no_record else _recording_path(configuration, options)
         supervisor = Supervisor(configuration.supervisor)
         report = RunReport(configuration)
-        run = Run(configuration, options, supervisor, bus, clock, stop, report, recording, player)
+        run = Run(
+            configuration=configuration,
+            options=options,
+            supervisor=supervisor,
+            bus=bus,
+            clock=clock,
+            stop=stop,
+            report=report,
+            recording=recording,
+            player=player,
+        )
         return _supervise(run)
 
 

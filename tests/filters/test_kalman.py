@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.special import erf
 from scipy.stats import truncnorm
 
 from lsu_mesh import InconsistentData, Kalman, LSUModel, ModelError, Orthotope, TruncatedKalman, simulate, systems
+from lsu_mesh.array_types import Array
 from lsu_mesh.filters.kalman import Gaussian
 from lsu_mesh.filters.truncated_kalman import truncated, truncated_normal
 
-Array = NDArray[np.float64]
 P3 = systems.get("P3")
 PRIOR = Orthotope([-1.0] * 3, [1.0] * 3)
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.errors import ModelError
 from lsu_mesh.supports import polytope
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
@@ -17,8 +17,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
-
-Array = NDArray[np.float64]
 
 
 def small_set(rng: np.random.Generator) -> ConstrainedZonotope:

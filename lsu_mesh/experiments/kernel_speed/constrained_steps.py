@@ -79,7 +79,7 @@ def _steps(generators: int, constraints: int, steps: int, *, beside_zonoopt: boo
             u, y = data.U[k], data.Y[k + 1]
             own.append(_own_step(engine, engine.snapshot(), u, y))
             if beside_zonoopt:
-                other.append(zonoopt_step(model, engine.support.arrays, u, y, constraints))
+                other.append(zonoopt_step(model, engine.support.arrays, u, y=y, max_constraints=constraints))
         engine.predict(data.U[k])
     return own, other
 

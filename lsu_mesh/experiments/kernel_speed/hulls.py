@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.experiments.kernel_speed.other_libraries import (
     Body,
     installed,
@@ -23,8 +23,6 @@ from lsu_mesh.kernels.linear_programs.dual_bound import absolute_row_sums, dual_
 from lsu_mesh.kernels.linear_programs.safe_maxima import maxima, open_program
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Hull = Callable[[], tuple[Vector, Vector]]
 
 DIMENSION, GENERATORS, CONSTRAINTS = 3, 20, 8

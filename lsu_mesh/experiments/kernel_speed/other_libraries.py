@@ -7,12 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.model import LSUModel
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Body = tuple[Vector, Matrix, Matrix, Vector]
 
 

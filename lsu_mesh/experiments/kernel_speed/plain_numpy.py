@@ -12,11 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes.strip_update import TIE
 from lsu_mesh.model import LSUModel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class PlainModel(NamedTuple):
@@ -46,7 +44,9 @@ def plain_model(model: LSUModel) -> PlainModel:
     assert model.B is not None
     assert model.noise_map is None
     A, C = np.array(model.A), np.array(model.C)
-    return PlainModel(A, np.array(model.B), C, np.array(model.rho), np.array(model.r), np.abs(A), np.abs(C))
+    return PlainModel(
+        A=A, B=np.array(model.B), C=C, rho=np.array(model.rho), r=np.array(model.r), abs_A=np.abs(A), abs_C=np.abs(C)
+    )
 
 
 def cut(c: Vector, T: Matrix, p: Vector, low: float, high: float) -> tuple[Vector, Matrix]:
@@ -80,10 +80,12 @@ def lsuo(model: PlainModel, c: Vector, q: Vector, y: Vector, u: Vector) -> tuple
     center, reach = model.C @ c, model.r + model.abs_C @ q
     new_c, T = c, np.diag(q)
     for p, value, r in zip(model.C, y, model.r, strict=True):
-        new_c, T = cut(new_c, T, p, value - r, value + r)
+        new_c, T = cut(new_c, T, p, low=value - r, high=value + r)
     radius = np.abs(T).sum(axis=1)
     lower, upper = np.maximum(new_c - radius, c - q), np.minimum(new_c + radius, c + q)
-    bounds = Bounds(lower, upper, float(np.prod(upper - lower)), center - reach, center + reach)
+    bounds = Bounds(
+        lower=lower, upper=upper, volume=float(np.prod(upper - lower)), y_lower=center - reach, y_upper=center + reach
+    )
     next_c = model.A @ (0.5 * (lower + upper)) + model.B @ u
     return next_c, model.abs_A @ (0.5 * (upper - lower)) + model.rho, bounds
 
@@ -92,10 +94,10 @@ def lsup(model: PlainModel, c: Vector, T: Matrix, y: Vector, u: Vector) -> tuple
     """One step of LSUP with the time update ``"image"`` from the parallelotope ``c + T ξ``, (n,), (n, n)."""
     center, reach = model.C @ c, model.r + np.abs(model.C @ T).sum(axis=1)
     for p, value, r in zip(model.C, y, model.r, strict=True):
-        c, T = cut(c, T, p, value - r, value + r)
+        c, T = cut(c, T, p, low=value - r, high=value + r)
     radius = np.abs(T).sum(axis=1)
     volume = 2.0**c.size * abs(float(np.linalg.det(T)))
-    bounds = Bounds(c - radius, c + radius, volume, center - reach, center + reach)
+    bounds = Bounds(lower=c - radius, upper=c + radius, volume=volume, y_lower=center - reach, y_upper=center + reach)
     image = model.A @ T
     return model.A @ c + model.B @ u, image * (1.0 + np.abs(np.linalg.inv(image)) @ model.rho), bounds
 

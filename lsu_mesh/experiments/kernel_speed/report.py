@@ -36,8 +36,16 @@ class Effort(NamedTuple):
     processes: int
 
 
-FULL = Effort((2, 3, 6, 12, 30), (10, 15, 20, 30, 40, 60), 20, 10_000, 9, 0.03, 5)
-QUICK = Effort((2, 3), (10, 20), 5, 1_000, 3, 0.005, 1)
+FULL = Effort(
+    sizes=(2, 3, 6, 12, 30),
+    generators=(10, 15, 20, 30, 40, 60),
+    sets=20,
+    instances=10_000,
+    rounds=9,
+    seconds=0.03,
+    processes=5,
+)
+QUICK = Effort(sizes=(2, 3), generators=(10, 20), sets=5, instances=1_000, rounds=3, seconds=0.005, processes=1)
 
 
 class Demand(NamedTuple):
@@ -84,8 +92,19 @@ def measure(effort: Effort, tell: Callable[[str], None] = lambda words: None) ->
         tell("new processes")
         imported = modules_of_import()
         first = [first_step(kind, effort.processes) for kind in ("LSUO", "LSUCZ")]
-    demands = _demands(steps, bank, hull, safe, step, first)
-    return Report(_machine(core), steps, bank, hull, safe, step, generators, imported, first, demands)
+    demands = _demands(steps, bank, hull, safe=safe, step=step, first=first)
+    return Report(
+        machine=_machine(core),
+        steps=steps,
+        bank=bank,
+        hull=hull,
+        safe_bounds=safe,
+        constrained_step=step,
+        generators=generators,
+        imported=imported,
+        first_steps=first,
+        demands=demands,
+    )
 
 
 def as_dictionary(report: Report) -> dict[str, Any]:
@@ -130,11 +149,15 @@ def _ratio(other: float | None, own: float | None) -> float | None:
 
 
 def _at_least(what: str, measured: float | None, limit: float) -> Demand:
-    return Demand(what, measured, "≥", limit, None if measured is None else measured >= limit)
+    return Demand(
+        what=what, measured=measured, relation="≥", limit=limit, met=None if measured is None else measured >= limit
+    )
 
 
 def _at_most(what: str, measured: float | None, limit: float) -> Demand:
-    return Demand(what, measured, "≤", limit, None if measured is None else measured <= limit)
+    return Demand(
+        what=what, measured=measured, relation="≤", limit=limit, met=None if measured is None else measured <= limit
+    )
 
 
 def _machine(core: int | None) -> dict[str, str | int | None]:

@@ -103,7 +103,7 @@ def plain_run(kind: str, model: LSUModel, data: Simulation, rows: int) -> list[p
     n = model.state_count
     shape = np.ones(n) if kind == "LSUO" else np.eye(n)
     arrays = plain_numpy.plain_model(model)
-    return plain_numpy.run(PLAIN[kind], arrays, np.zeros(n), shape, data.Y[:rows], data.U[:rows])
+    return plain_numpy.run(PLAIN[kind], arrays, np.zeros(n), shape=shape, Y=data.Y[:rows], U=data.U[:rows])
 
 
 def bank_speed(instances: int, rows: int, rounds: int, seconds: float) -> BankSpeed:

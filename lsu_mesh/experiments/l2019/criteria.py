@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Vector
 from lsu_mesh.experiments.monte_carlo import Draws, draw, simulate_all
 from lsu_mesh.filters.bank import FilterBank
 from lsu_mesh.filters.compiled import CompiledFilter
@@ -25,8 +25,7 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation
 from lsu_mesh.supports.orthotope import Orthotope
 
-Matrix = NDArray[np.float64]
-PerRun = NDArray[np.float64]
+PerRun = Vector
 """One number per output noise and run, (levels, runs)."""
 
 START = 2.0
@@ -75,7 +74,7 @@ def criteria(job: Job) -> dict[tuple[str, str], PerRun]:
     found: dict[tuple[str, str], PerRun] = {}
     kept: dict[str, FilterRun] = {}
     for name, (kind, options) in KINDS.items():
-        record = run_bank(kind, options, models, job.runs, data)
+        record = run_bank(kind, options, models, runs=job.runs, data=data)
         for criterion, values in of_a_filter(record, data).items():
             found[name, criterion] = values.reshape(shape)
         if name in ("LSUO", "LSUP"):

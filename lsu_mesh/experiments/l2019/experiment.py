@@ -63,12 +63,24 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
         ),
         every_cell(surfaces),
     ]
-    return Outcome(tables, checks(surfaces, thin, steps), drawn, TITLE, _notes(runs, steps, seed), captions, ERRATA)
+    return Outcome(
+        tables=tables,
+        checks=checks(surfaces, thin, steps),
+        figures=drawn,
+        title=TITLE,
+        notes=_notes(runs, steps, seed),
+        captions=captions,
+        errata=ERRATA,
+    )
 
 
 def full_grid(seed: int, runs: int, steps: int, watch: Watch = unwatched) -> Surfaces:
     """The criteria of all filters with a compiled bank in all cells; P9 over fewer runs and steps."""
-    jobs = [Job(system, rho, LEVELS, runs, steps, seed) for system in SYSTEMS for rho in LEVELS]
+    jobs = [
+        Job(system=system, rho=rho, levels=LEVELS, runs=runs, steps=steps, seed=seed)
+        for system in SYSTEMS
+        for rho in LEVELS
+    ]
     found = spread(criteria, jobs, part(watch, 0.0, 0.7))
     few = [job._replace(runs=min(OVERLAP_RUNS, runs)) for job in jobs]
     surfaces = Surfaces(LEVELS, LEVELS)
@@ -82,7 +94,11 @@ def full_grid(seed: int, runs: int, steps: int, watch: Watch = unwatched) -> Sur
 
 def thin_grid(seed: int, runs: int, steps: int, watch: Watch = unwatched) -> Surfaces:
     """The criteria of single filters, with LSUCZ, in every third row and column of the grid."""
-    jobs = [Job(system, rho, THIN_LEVELS, runs, steps, seed) for system in SYSTEMS for rho in THIN_LEVELS]
+    jobs = [
+        Job(system=system, rho=rho, levels=THIN_LEVELS, runs=runs, steps=steps, seed=seed)
+        for system in SYSTEMS
+        for rho in THIN_LEVELS
+    ]
     found = spread(with_zonotopes, jobs, watch)
     surfaces = Surfaces(THIN_LEVELS, THIN_LEVELS)
     for i, system in enumerate(SYSTEMS):

@@ -35,7 +35,7 @@ def ratio(job: Job) -> float:
 def ratios(seed: int, runs: int, steps: int, watch: Watch = unwatched) -> dict[int, float]:
     """By seed."""
     seeds = range(seed, seed + SEEDS)
-    jobs = [Job("S2", NOISE, (NOISE,), runs, steps, one) for one in seeds]
+    jobs = [Job(system="S2", rho=NOISE, levels=(NOISE,), runs=runs, steps=steps, seed=one) for one in seeds]
     return dict(zip(seeds, spread(ratio, jobs, watch), strict=True))
 
 

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix
 from lsu_mesh.experiments.l2019.criteria import OF_A_FILTER, OF_THE_PAIR, PerRun
 from lsu_mesh.experiments.outcome import Cell, Column, Spread, Table
 
-Matrix = NDArray[np.float64]
 Key = tuple[str, str, str]
 """System, filter ("" for what belongs to the pair), criterion."""
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.comparison import stated, table
 from lsu_mesh.experiments.outcome import Cell, Check, Column, Outcome, Spread, Table
 from lsu_mesh.experiments.p2006.figures import PRIOR, SYSTEMS, data_table, draw, trace
@@ -19,7 +19,6 @@ from lsu_mesh.filters.window.structure import Structure
 from lsu_mesh.filters.window.window_map import WindowMAP
 from lsu_mesh.simulation import simulate
 
-Array = NDArray[np.float64]
 STEPS, RUNS = 200, 20
 QUICK_STEPS, QUICK_RUNS = 100, 3
 WINDOWS = (10, 25, 50)
@@ -91,7 +90,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
         "p2006-figure-1-offline": partial(draw, traces, is_online=False),
         "p2006-figure-1-online": partial(draw, traces, is_online=True),
     }
-    return Outcome(tables, checks, figures, TITLE, notes, captions)
+    return Outcome(tables=tables, checks=checks, figures=figures, title=TITLE, notes=notes, captions=captions)
 
 
 def _mean_widths(filter: WindowMAP, Y: Array, U: Array) -> Array:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.outcome import Cell, Column, Table
 from lsu_mesh.filters.window.batch_map import batch_map, record
 from lsu_mesh.filters.window.program import HalfWidths
@@ -20,7 +20,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 SYSTEMS = ("S2", "S3")
 """Two states and one output, as the paper's system."""
 WINDOW = 25

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.outcome import Check, Outcome
 from lsu_mesh.experiments.p2014.figures import (
     INTERVAL_WINDOW,
@@ -18,7 +19,7 @@ from lsu_mesh.experiments.p2014.figures import (
     timings,
     traces,
 )
-from lsu_mesh.experiments.p2014.runs import CORRELATED, KNOWN, UNCORRELATED, Array, Case, Job, Result, result
+from lsu_mesh.experiments.p2014.runs import CORRELATED, KNOWN, UNCORRELATED, Case, Job, Result, result
 from lsu_mesh.experiments.p2014.tables import (
     KALMAN,
     TABLE_I,
@@ -67,23 +68,23 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     tables = [performance(found), errors(found), confidence(found), points(found), times(found)]
     tables += [parameter_table(lines), interval_table(lines), times_table(measured)]
     return Outcome(
-        tables,
-        [] if quick else checks(found),
-        {
+        tables=tables,
+        checks=[] if quick else checks(found),
+        figures={
             "p2014-figure-1": partial(draw_parameter, lines),
             "p2014-figure-2": partial(draw_intervals, lines),
             "p2014-figure-3-times": partial(draw_times, measured),
         },
-        TITLE,
-        _notes(steps, runs),
-        {
+        title=TITLE,
+        notes=_notes(steps, runs),
+        captions={
             "p2014-figure-1": "Figure 1. Point estimates of F₁₂ over time (a part of the run), and its true value",
             "p2014-figure-2": f"Figure 2. Interval estimates (29) of the third state, Δ = {INTERVAL_WINDOW} (a part of "
             "the run), and its true values",
             "p2014-figure-3-times": "Figure 3. Processing time of a step against the number of states, one output, one "
             "input, known matrices",
         },
-        ERRATA,
+        errata=ERRATA,
     )
 
 
@@ -104,18 +105,30 @@ def jobs(seeds: range, steps: int) -> list[Job]:
     """Everything that has to run, the longest first."""
     plans = [(5, CORRELATED), (25, CORRELATED), (5, UNCORRELATED), (25, UNCORRELATED), (25, KNOWN)]
     every = [
-        Job(window(length, point), case, length, point, 1.0, seed, steps)
+        Job(name=window(length, point), case=case, window=length, point=point, factor=1.0, seed=seed, steps=steps)
         for length, case in plans
         for point in ("vertex", "centre")
         for seed in (seeds[:OTHER_RUNS] if (point, case) == ("vertex", UNCORRELATED) else seeds)
     ]
     every += [
-        Job(window(length, "centre"), CORRELATED, length, "centre", 1.0, seed, steps)
+        Job(
+            name=window(length, "centre"),
+            case=CORRELATED,
+            window=length,
+            point="centre",
+            factor=1.0,
+            seed=seed,
+            steps=steps,
+        )
         for length in TABLE_I
         if length not in (5, 25)
         for seed in seeds[:OTHER_RUNS]
     ]
-    every += [Job(name, KNOWN, 0, "", factor, seed, steps) for name, factor in KALMAN.items() for seed in seeds]
+    every += [
+        Job(name=name, case=KNOWN, window=0, point="", factor=factor, seed=seed, steps=steps)
+        for name, factor in KALMAN.items()
+        for seed in seeds
+    ]
     return sorted(every, key=lambda job: (job.point != "vertex", -job.window))
 
 
@@ -133,7 +146,7 @@ def checks(found: Found) -> list[Check]:
     made = []
     for length, volume, room in ((5, 15.5, 3.3), (25, 5.84, 1.0)):
         name = window(length, "vertex")
-        measured = far(name, CORRELATED, "volume", (volume,), 1e3)
+        measured = far(name, CORRELATED, "volume", (volume,), factor=1e3)
         made.append(Check(f"p2014: V · 1e3 at Δ = {length}, distance from {volume:g}", measured, room))
     for length, target in states.items():
         measured = far(window(length, "vertex"), CORRELATED, "states", target)

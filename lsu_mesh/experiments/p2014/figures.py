@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.outcome import Cell, Column, Table
 from lsu_mesh.experiments.p2014.runs import CORRELATED, KAPPAS, F, Job, estimator, simulate
 from lsu_mesh.filters.window.window_map import WindowMAP
@@ -19,7 +19,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 WINDOWS = (5, 25)
 INTERVAL_WINDOW = 25
 """Δ of Figure 2: the paper does not say which."""
@@ -51,7 +50,9 @@ def traces(seed: int, steps: int = STEPS) -> Traces:
     parameter = {}
     lower, upper = np.full((2, steps + 1, len(KAPPAS)), np.nan)
     for window in WINDOWS:
-        filter = estimator(Job("", CORRELATED, window, "centre", 1.0, seed, steps))
+        filter = estimator(
+            Job(name="", case=CORRELATED, window=window, point="centre", factor=1.0, seed=seed, steps=steps)
+        )
         assert isinstance(filter, WindowMAP)
         parameter[window] = np.empty(steps + 1)
         for t in range(steps + 1):
@@ -143,7 +144,9 @@ def timings(seed: int) -> list[Timing]:
 def _timing(n: int, window: int, seed: int) -> Timing:
     source = np.random.default_rng([seed, n])
     orthogonal, _ = np.linalg.qr(source.standard_normal((n, n)))
-    model = LSUModel(0.9 * orthogonal, source.standard_normal((n, 1)), source.standard_normal((1, n)), 0.1, 0.3)
+    model = LSUModel(
+        A=0.9 * orthogonal, B=source.standard_normal((n, 1)), C=source.standard_normal((1, n)), rho=0.1, r=0.3
+    )
     data = simulate_model(model, window + 2 + TIMED_STEPS, seed)
     filter = WindowMAP(model, Orthotope([-1.0] * n, [1.0] * n), window=window)
     seconds = []

@@ -6,15 +6,14 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array, Flags
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.truncated_kalman import TruncatedKalman
 from lsu_mesh.filters.window.window_map import WindowMAP
 from lsu_mesh.model import LSUModel
 
-Array = NDArray[np.float64]
-Shares = NDArray[np.float64] | NDArray[np.bool_]
+Shares = Array | Flags
 A = ((1.0, -0.5, 0.2), (0.5, 0.1, 0.0), (0.3, 0.0, -0.1))
 B = ((0.1,), (0.6,), (0.3,))
 C = ((1.0, 0.0, 0.5), (0.0, 1.0, 0.5))
@@ -89,7 +88,7 @@ def simulate(correlated: bool, seed: int, steps: int) -> tuple[Array, Array, Arr
 def estimator(job: Job) -> Filter:
     """The window estimator, or the truncated Kalman filter, of a job."""
     size, box = np.sqrt(job.factor), (LOWER, UPPER)
-    model = LSUModel(A, B, C, size * RHO, size * R, domain=box)
+    model = LSUModel(A=A, B=B, C=C, rho=size * RHO, r=size * R, domain=box)
     if not job.window:
         return TruncatedKalman(model, box)
     unknown = UNKNOWN if job.case.estimated else ()
@@ -122,7 +121,14 @@ def result(job: Job) -> Result:
     outside, other = (100.0 * np.mean(column, axis=0) for column in who)
     ellipsoid = np.nan if job.window else 4.0 / 3.0 * np.pi * float(np.mean(np.sqrt(volumes)))
     return Result(
-        states, fits, predictions, float(np.mean(volumes)), outside, other, ellipsoid, seconds / (job.steps + 1)
+        states=states,
+        fits=fits,
+        predictions=predictions,
+        volume=float(np.mean(volumes)),
+        outside=outside,
+        other=other,
+        ellipsoid=ellipsoid,
+        seconds=seconds / (job.steps + 1),
     )
 
 

@@ -67,7 +67,9 @@ def performance(found: Found) -> Table:
             runs = found.get((window(length, point), CORRELATED))
             if runs is not None:
                 labels = (str(length), point)
-                rows += _size(labels, "V · 1e3", volume, [1e3 * run.volume for run in runs], _shrinks(found, length))
+                rows += _size(
+                    labels, "V · 1e3", volume, here=[1e3 * run.volume for run in runs], trend=_shrinks(found, length)
+                )
                 rows += _outside(labels, outside, runs) if point == "centre" else ()
     title = "Table I: correlated noise, E and F estimated, by window length Δ"
     return table("p2014-table-1", title, ["Δ", "point", "quantity"], rows)
@@ -132,7 +134,7 @@ def confidence(found: Found) -> Table:
                 shrinks = _mean(found[window(25, "centre"), UNCORRELATED], "volume") < _mean(
                     found[window(5, "centre"), UNCORRELATED], "volume"
                 )
-                rows += _size((key,), "V · 1e3", 1e3 * size, [1e3 * run.volume for run in runs], shrinks)
+                rows += _size((key,), "V · 1e3", 1e3 * size, here=[1e3 * run.volume for run in runs], trend=shrinks)
                 rows += _outside((key,), outside, runs) if key.endswith("centre") else ()
     rows.append(_growth(found))
     title = "Table III: volumes and shares of states outside, with E = F = I, which the window estimator has to find"

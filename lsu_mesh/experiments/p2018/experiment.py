@@ -74,7 +74,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     ]  # fmt: skip
     title = f"Table 1, state 2, {len(seeds)} runs × {STEPS} steps; *here* is the spread of single runs"
     return Outcome(
-        [
+        tables=[
             table("p2018-table-1", title, ["estimator", "quantity"], rows),
             _ours(found, len(seeds)),
             _times(found, times),
@@ -82,24 +82,24 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
             noise.table(noise_errors),
             times_table(times),
         ],
-        checks(found),
-        {
+        checks=checks(found),
+        figures={
             "p2018-figure-1": partial(draw_states, shown),
             "p2018-figure-2": partial(noise.draw_errors, noise_errors),
             "p2018-figure-3-times": partial(draw_times, times),
         },
-        TITLE,
-        f"System (15): ρ = 0.1, r = 0.3, {STEPS} steps, u ~ N(0, 1), seeds {seeds[0]} to {seeds[-1]}. The paper gives "
-        f"one run and no prior: here the box ±{START:g} in every state, from which x_1 is drawn. The zonotopic Kalman "
-        "filter is shown in the predictor form, which is Combastel's and has the paper's half-widths to the last "
-        "digit, and in the filter form, which uses the step's own data. The window estimator has Δ = "
+        title=TITLE,
+        notes=f"System (15): ρ = 0.1, r = 0.3, {STEPS} steps, u ~ N(0, 1), seeds {seeds[0]} to {seeds[-1]}. The paper "
+        f"gives one run and no prior: here the box ±{START:g} in every state, from which x_1 is drawn. The zonotopic "
+        "Kalman filter is shown in the predictor form, which is Combastel's and has the paper's half-widths to the "
+        "last digit, and in the filter form, which uses the step's own data. The window estimator has Δ = "
         f"{WINDOW}, κ = {KAPPA:g} and a vertex of the optimal face; its intervals are no guaranteed bounds.",
-        {
+        captions={
             "p2018-figure-1": "Figure 1. Simulated and estimated states with estimated bounds (a part of the run)",
             "p2018-figure-2": "Figure 2. Error of the estimate of state 2 over state noise ρ and output noise r",
             "p2018-figure-3-times": "Figure 3. Processing time of a step against the number of states",
         },
-        ERRATA,
+        errata=ERRATA,
     )  # fmt: skip
 
 

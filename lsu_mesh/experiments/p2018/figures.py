@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.experiments.outcome import Cell, Column, Table
 from lsu_mesh.experiments.p2018.runs import data_of, prior
 from lsu_mesh.filters.lsuo import LSUO
@@ -20,7 +20,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 FIRST, LAST = 40, 70
 """Steps that Figure 1 shows."""
 DIMENSIONS = (2, 3, 5, 8, 12, 20, 30)
@@ -88,7 +87,9 @@ def timings(seed: int) -> list[Timing]:
 def _timing(n: int, seed: int) -> Timing:
     source = np.random.default_rng([seed, n])
     orthogonal, _ = np.linalg.qr(source.standard_normal((n, n)))
-    model = LSUModel(0.9 / np.sqrt(n) * orthogonal, np.ones((n, 1)), source.standard_normal((2, n)), 0.1, 0.3)
+    model = LSUModel(
+        A=0.9 / np.sqrt(n) * orthogonal, B=np.ones((n, 1)), C=source.standard_normal((2, n)), rho=0.1, r=0.3
+    )
     data = simulate(model, TIMED_STEPS, seed)
     best = np.inf
     for _ in range(ROUNDS):

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
@@ -21,8 +21,6 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation, random_uniform, simulate
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Make = Callable[[LSUModel, Orthotope], Filter]
 
 STEPS = 100
@@ -110,7 +108,7 @@ def result(job: Job) -> Result:
     record = run_filter(engine, data.Y, data.U)
     seconds = time.process_time() - began
     outputs = record.points @ model.C.T if estimator.filtered_output else record.y_points
-    return Result(statistics(record.points, record.lower, record.upper, outputs, data), seconds)
+    return Result(statistics(record.points, record.lower, record.upper, outputs=outputs, data=data), seconds)
 
 
 def statistics(points: Matrix, lower: Matrix, upper: Matrix, outputs: Matrix, data: Simulation) -> tuple[float, ...]:

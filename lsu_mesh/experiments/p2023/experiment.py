@@ -88,23 +88,23 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     ]  # fmt: skip
     measures = {1: ("rmse", "RMSE"), 2: ("mae", "MAE"), 3: ("std", "STD")}
     return Outcome(
-        tables,
-        checks(found, 3.0 if quick else 1.0),
-        {
+        tables=tables,
+        checks=checks(found, 3.0 if quick else 1.0),
+        figures={
             f"p2023-figure-{i}": partial(draw_errors, LEVELS, _curves(found, name), label)
             for i, (name, label) in measures.items()
         },
-        TITLE,
-        f"System (15) of P2018 with ω = {OMEGA:g}, ν = 10^−K, {setting} from seed {seed}, u ~ N(0, 1). Neither the "
-        f"prior nor the limits of complexity are in the paper: here the box ±{START:g}, from which x_1 is drawn, and "
-        f"at most {GENERATORS} generators and {CONSTRAINTS} constraints. RMSE and MAE are over all steps and states, "
-        f"as the paper's seem to be; the last table leaves out the first {SETTLED - 1} steps, whose error is that of "
-        "the prior.",
-        {
+        title=TITLE,
+        notes=f"System (15) of P2018 with ω = {OMEGA:g}, ν = 10^−K, {setting} from seed {seed}, u ~ N(0, 1). Neither "
+        f"the prior nor the limits of complexity are in the paper: here the box ±{START:g}, from which x_1 is drawn, "
+        f"and at most {GENERATORS} generators and {CONSTRAINTS} constraints. RMSE and MAE are over all steps and "
+        f"states, as the paper's seem to be; the last table leaves out the first {SETTLED - 1} steps, whose error is "
+        "that of the prior.",
+        captions={
             f"p2023-figure-{i}": f"Figure {i}. {label} of state estimates over K, ν = 10^−K"
             for i, (_, label) in measures.items()
         },
-        ERRATA,
+        errata=ERRATA,
     )
 
 

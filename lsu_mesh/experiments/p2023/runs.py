@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lsu_mesh import systems
+from lsu_mesh.array_types import Matrix
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
@@ -18,8 +18,6 @@ from lsu_mesh.filters.run import run_filter
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation, random_uniform, simulate
 from lsu_mesh.supports.orthotope import Orthotope
-
-Matrix = NDArray[np.float64]
 
 OMEGA = 1e-4
 START = 0.1
@@ -87,7 +85,7 @@ def _zonotopes(model: LSUModel, prior: Orthotope, data: Simulation) -> dict[str,
 def _errors(points: Matrix, lower: Matrix, upper: Matrix, truth: Matrix) -> Errors:
     error = points - truth
     return Errors(
-        float(np.sqrt(np.square(error).mean())), float(np.abs(error).mean()), float(error.std()),
-        float(np.sqrt(np.square(error[SETTLED - 1 :]).mean())),
-        int(((lower > truth) | (upper < truth)).any(axis=1).sum()),
+        rmse=float(np.sqrt(np.square(error).mean())), mae=float(np.abs(error).mean()), std=float(error.std()),
+        settled=float(np.sqrt(np.square(error[SETTLED - 1 :]).mean())),
+        outside=int(((lower > truth) | (upper < truth)).any(axis=1).sum()),
     )  # fmt: skip

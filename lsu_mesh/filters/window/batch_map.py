@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.window.program import HalfWidths, Selected, WindowData, WindowProgram, WindowSolution
 from lsu_mesh.filters.window.structure import Structure
 from lsu_mesh.supports.orthotope import Orthotope
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 SETTLED = 1e-6
 """Passes end when no unknown entry moves by more than this share of its range."""
 SHORTEST_STEP = 1.0 / 64.0
@@ -83,13 +82,15 @@ def batch_map(
     window = _window(structure, data, first)
     if not structure.has_unknown:
         return program.solve(window, point)
-    best = _at(structure.start, structure, data, widths, first, point)
+    best = _at(structure.start, structure, data, widths=widths, first=first, point=point)
     for _ in range(passes):
         theta = best.theta
         target = program.solve(window._replace(X=best.X, theta=theta), point)
         step, improved = 1.0, None
         while step >= SHORTEST_STEP and improved is None:
-            answer = _at(theta + step * (target.theta - theta), structure, data, widths, first, point)
+            answer = _at(
+                theta + step * (target.theta - theta), structure, data, widths=widths, first=first, point=point
+            )
             improved = answer if answer.objective < best.objective else None
             step *= 0.5
         if improved is None:
@@ -117,7 +118,7 @@ def _window(structure: Structure, data: Record, first: Orthotope | None) -> Wind
             lower[rows], upper[rows] = np.maximum(lower[rows], box.lower), np.minimum(upper[rows], box.upper)
     A, B = structure.known["A"], structure.known["B"]
     return WindowData(
-        data.Y, data.U, np.zeros_like(data.U), np.broadcast_to(A, (N - 1, *A.shape)),
-        np.broadcast_to(B, (N - 1, *B.shape)), lower, upper, np.clip(np.zeros((N, n)), lower, upper),
-        structure.start, True,
+        Y=data.Y, U=data.U, spread=np.zeros_like(data.U), A=np.broadcast_to(A, (N - 1, *A.shape)),
+        B=np.broadcast_to(B, (N - 1, *B.shape)), lower=lower, upper=upper, X=np.clip(np.zeros((N, n)), lower, upper),
+        theta=structure.start, is_uniform=True,
     )  # fmt: skip

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Indices, Vector
 from lsu_mesh.errors import InconsistentData
-from lsu_mesh.kernels.linear_programs.interior_point import Limits, Rows
+from lsu_mesh.kernels.linear_programs.banded_program import Limits, Rows
 from lsu_mesh.kernels.linear_programs.window_program import checked, in_units_of
 
-Vector = NDArray[np.float64]
-Indices = NDArray[np.int64]
 INFEASIBLE = 2
 TOLERANCES: dict[str, float] = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
 

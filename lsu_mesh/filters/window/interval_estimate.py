@@ -7,10 +7,8 @@ expectation of a uniform likelihood's centre and half-width. Source: Pavelková 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Matrix = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from lsu_mesh.array_types import Counts, Matrix
 
 
 def interval_estimate(smallest: Matrix, largest: Matrix, counts: Counts, kappa: float) -> tuple[Matrix, Matrix]:

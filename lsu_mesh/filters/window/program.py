@@ -17,14 +17,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Stack, Vector
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.filters.window.structure import Structure
-from lsu_mesh.kernels.linear_programs.interior_point import Limits, Rows
+from lsu_mesh.kernels.linear_programs.banded_program import Limits, Rows
 from lsu_mesh.kernels.linear_programs.window_program import data_size, solve_window
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Stack = NDArray[np.float64]
 Selected = Literal["centre", "vertex"]
 
 ACCEPTED_GAP = 1e-7
@@ -96,7 +94,7 @@ class HalfWidths(NamedTuple):
     @classmethod
     def separate(cls, lower: Vector, upper: Vector, weights: Vector) -> HalfWidths:
         """One unknown for each half-width, all (q + m,)."""
-        return cls(np.arange(lower.size), np.ones(lower.size), lower, upper, weights)
+        return cls(columns=np.arange(lower.size), factors=np.ones(lower.size), lower=lower, upper=upper, cost=weights)
 
     @classmethod
     def common_factor(cls, shape: Vector, learns: NDArray[np.bool_] | None = None) -> HalfWidths:
@@ -105,7 +103,7 @@ class HalfWidths(NamedTuple):
         learns (q + m,): the others keep the half-width of ``shape``; ``None``: all are learned.
         """
         columns = np.where((shape > 0) & (True if learns is None else learns), 0, -1)
-        return cls(columns, shape, np.zeros(1), np.full(1, np.inf), np.ones(1))
+        return cls(columns=columns, factors=shape, lower=np.zeros(1), upper=np.full(1, np.inf), cost=np.ones(1))
 
     def values(self, h: Vector) -> Vector:
         """All half-widths (q + m,)."""
@@ -154,11 +152,14 @@ class WindowProgram:
             iterations, z, value, bound, violation, scale = solve_window(
                 rows, limits, start, count, 2 * data.X.shape[1] - 1, MAX_ITERATIONS
             )
-            if _is_accepted(value, bound, violation, scale, ACCEPTED_SHARE):
-                return self._solution(z, data, value, bound, iterations, "interior-point")
+            if _is_accepted(value, bound, violation, scale=scale, share=ACCEPTED_SHARE):
+                return self._solution(z, data, value, bound=bound, iterations=iterations, solver="interior-point")
         solution, share = self._by_highs(rows, limits, data, point)
         if point == "centre" and violation <= ACCEPTED_VIOLATION * scale and value - bound < share * scale:
-            solution, share = self._solution(z, data, value, bound, iterations, "interior-point"), 0.0
+            solution, share = (
+                self._solution(z, data, value, bound=bound, iterations=iterations, solver="interior-point"),
+                0.0,
+            )
         if share > MAX_SHARE and point == "vertex":
             return self.solve(data, "centre", cost)
         if share > MAX_SHARE:
@@ -175,9 +176,9 @@ class WindowProgram:
         count = data.X.size
         size = data_size(rows, data.X.ravel(), count)
         method = "highs-ds" if point == "vertex" else "highs"
-        z, value, bound, violation, iterations = highs_answer(rows, limits, count, size, method)
+        z, value, bound, violation, iterations = highs_answer(rows, limits, count, size=size, method=method)
         share = (value - bound) / size if violation <= ACCEPTED_VIOLATION * size else np.inf
-        return self._solution(z, data, value, bound, iterations, "HiGHS"), share
+        return self._solution(z, data, value, bound=bound, iterations=iterations, solver="HiGHS"), share
 
     def _solution(
         self, z: Vector, data: WindowData, value: float, bound: float, iterations: int, solver: str
@@ -186,8 +187,8 @@ class WindowProgram:
         widths = self.widths.values(z[count + coefficients :])
         q = self.structure.noise_count
         return WindowSolution(
-            z[:count].reshape(data.X.shape), z[count : count + coefficients], widths[:q], widths[q:],
-            value, bound, iterations, solver,
+            X=z[:count].reshape(data.X.shape), theta=z[count : count + coefficients], rho=widths[:q], r=widths[q:],
+            objective=value, bound=bound, iterations=iterations, solver=solver,
         )  # fmt: skip
 
     def limits(self, data: WindowData, cost: Vector | None = None) -> Limits:
@@ -213,9 +214,16 @@ class WindowProgram:
         states = (N - 1) * n
         a, g, d = rows.a, rows.g, rows.d
         self._write_transitions(
-            data, a[:states].reshape(N - 1, n, 2 * n), g[:states], d[:states], rows.reach[:states], is_written
+            data,
+            a[:states].reshape(N - 1, n, 2 * n),
+            g[:states],
+            d=d[:states],
+            reach=rows.reach[:states],
+            is_written=is_written,
         )
-        self._write_outputs(data, a[states:, :n], g[states:], d[states:], rows.span[states:], is_written)
+        self._write_outputs(
+            data, a[states:, :n], g[states:], d=d[states:], span=rows.span[states:], is_written=is_written
+        )
         return rows
 
     def _empty(self, N: int) -> Rows:

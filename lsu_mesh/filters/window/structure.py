@@ -12,13 +12,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.model import LSUModel
 
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 MATRICES = ("A", "B", "C", "E", "F")
 
 
@@ -152,7 +151,13 @@ def unit_triangular(name: str, value: ArrayLike | None, size: int) -> Matrix:
 def _entry(item: object, matrices: Mapping[str, Matrix], has_noise_map: bool) -> Unknown:
     try:
         entry = Unknown(**item) if isinstance(item, Mapping) else Unknown(*cast("Sequence[object]", item))  # type: ignore[arg-type]
-        entry = Unknown(str(entry.matrix), int(entry.row), int(entry.column), float(entry.lower), float(entry.upper))
+        entry = Unknown(
+            matrix=str(entry.matrix),
+            row=int(entry.row),
+            column=int(entry.column),
+            lower=float(entry.lower),
+            upper=float(entry.upper),
+        )
     except (TypeError, ValueError) as error:
         raise ModelError(
             f'an unknown entry must be [matrix, row, column, lower, upper] such as ["A", 1, 2, -1.0, 1.0], not {item!r}'

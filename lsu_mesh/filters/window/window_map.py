@@ -2,47 +2,28 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple, cast
+from typing import ClassVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from lsu_mesh.array_types import Counts, Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
 from lsu_mesh.filters.transfer_gain import hull_gain
 from lsu_mesh.filters.validation import checked_prior, input_interval, output_vector, same_states
 from lsu_mesh.filters.window.interval_estimate import interval_estimate
 from lsu_mesh.filters.window.program import HalfWidths, Selected, WindowData, WindowProgram, WindowSolution
+from lsu_mesh.filters.window.state import Window
 from lsu_mesh.filters.window.structure import Structure, UnknownEntries
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Counts = NDArray[np.int64]
 REWEIGHTINGS = 4
 """How often the weights of ``objective="log"`` are made anew."""
 MIN_SHARE = 1e-3
 """A half-width below this share of the largest weighs no more than one of this share."""
-
-
-class Window(NamedTuple):
-    """What the filter knows; no array is ever written again.
-
-    ``data``: states and outputs in the window, and the latest estimates; rho, r: estimated half-widths (q,), (m,);
-    smallest, largest (N, n), counts (N,): range and number of each state's estimates; reach (n,): half-widths of the
-    published interval.
-    """
-
-    data: WindowData
-    rho: Vector
-    r: Vector
-    smallest: Matrix
-    largest: Matrix
-    counts: Counts
-    reach: Vector
-    solution: WindowSolution | None
 
 
 class WindowMAP(Filter):
@@ -206,9 +187,15 @@ class WindowMAP(Filter):
         largest = np.fmax(state.largest, solution.X)
         counts = state.counts + 1
         self._state = Window(
-            data._replace(X=solution.X, theta=solution.theta), solution.rho, solution.r,
-            smallest, largest, counts, self._reach(smallest, largest, counts, state.reach), solution,
-        )  # fmt: skip
+            data=data._replace(X=solution.X, theta=solution.theta),
+            rho=solution.rho,
+            r=solution.r,
+            smallest=smallest,
+            largest=largest,
+            counts=counts,
+            reach=self._reach(smallest, largest, counts, state.reach),
+            solution=solution,
+        )
         return self.support
 
     def _solve(self, data: WindowData) -> WindowSolution:
@@ -265,17 +252,26 @@ class WindowMAP(Filter):
         none = np.full((1, x.size), np.nan)
         noise = np.abs(_noise(self._model, inverse)) @ state.rho
         return Window(
-            WindowData(
-                np.vstack([data.Y, np.full((1, data.Y.shape[1]), np.nan)]),
-                np.vstack([data.U, center]), np.vstack([data.spread, spread]),
-                np.concatenate([data.A, own_A[None]]), np.concatenate([data.B, own_B[None]]),
-                np.vstack([data.lower, low]), np.vstack([data.upper, high]), np.vstack([data.X, x]), theta,
-                data.is_uniform and used is self._model,
+            data=WindowData(
+                Y=np.vstack([data.Y, np.full((1, data.Y.shape[1]), np.nan)]),
+                U=np.vstack([data.U, center]),
+                spread=np.vstack([data.spread, spread]),
+                A=np.concatenate([data.A, own_A[None]]),
+                B=np.concatenate([data.B, own_B[None]]),
+                lower=np.vstack([data.lower, low]),
+                upper=np.vstack([data.upper, high]),
+                X=np.vstack([data.X, x]),
+                theta=theta,
+                is_uniform=data.is_uniform and used is self._model,
             ),
-            state.rho, state.r, np.vstack([state.smallest, none]), np.vstack([state.largest, none]),
-            np.append(state.counts, 0),
-            np.abs(inverse @ A) @ state.reach + np.abs(inverse @ B) @ spread + noise, state.solution,
-        )  # fmt: skip
+            rho=state.rho,
+            r=state.r,
+            smallest=np.vstack([state.smallest, none]),
+            largest=np.vstack([state.largest, none]),
+            counts=np.append(state.counts, 0),
+            reach=np.abs(inverse @ A) @ state.reach + np.abs(inverse @ B) @ spread + noise,
+            solution=state.solution,
+        )
 
     def _shortened(self, state: Window) -> Window:
         data = state.data
@@ -285,11 +281,21 @@ class WindowMAP(Filter):
         low, high = _met(low[0], high[0], data.lower[1], data.upper[1])
         lower, upper, Y = data.lower[1:].copy(), data.upper[1:].copy(), data.Y[1:].copy()
         lower[0], upper[0], Y[0] = low, high, np.nan
-        return Window(
-            WindowData(Y, data.U[1:], data.spread[1:], data.A[1:], data.B[1:], lower, upper, data.X[1:], data.theta,
-                data.is_uniform),
-            state.rho, state.r, state.smallest[1:], state.largest[1:], state.counts[1:], state.reach, state.solution,
-        )  # fmt: skip
+        return state._replace(
+            data=data._replace(
+                Y=Y,
+                U=data.U[1:],
+                spread=data.spread[1:],
+                A=data.A[1:],
+                B=data.B[1:],
+                lower=lower,
+                upper=upper,
+                X=data.X[1:],
+            ),
+            smallest=state.smallest[1:],
+            largest=state.largest[1:],
+            counts=state.counts[1:],
+        )
 
     def condition(self, support: Support) -> float:
         """Meet the box of the newest state with that of ``support``; the gain is that of the published intervals.
@@ -317,12 +323,26 @@ class WindowMAP(Filter):
         middle = np.where(np.isfinite(low) & np.isfinite(high), 0.5 * (low + high), np.clip(0.0, low, high))
         none = np.full((1, n), np.nan)
         self._state = Window(
-            WindowData(
-                np.full((1, m), np.nan), np.zeros((0, p)), np.zeros((0, p)), np.zeros((0, n, n)), np.zeros((0, n, p)),
-                low[None], high[None], middle[None], self._structure.start, True,
+            data=WindowData(
+                Y=np.full((1, m), np.nan),
+                U=np.zeros((0, p)),
+                spread=np.zeros((0, p)),
+                A=np.zeros((0, n, n)),
+                B=np.zeros((0, n, p)),
+                lower=low[None],
+                upper=high[None],
+                X=middle[None],
+                theta=self._structure.start,
+                is_uniform=True,
             ),
-            np.zeros(q), np.zeros(m), none, none, np.zeros(1, dtype=np.int64), 0.5 * (high - low), None,
-        )  # fmt: skip
+            rho=np.zeros(q),
+            r=np.zeros(m),
+            smallest=none,
+            largest=none,
+            counts=np.zeros(1, dtype=np.int64),
+            reach=0.5 * (high - low),
+            solution=None,
+        )
 
     def snapshot(self) -> object:
         """The window; none of its arrays is ever written again."""

@@ -8,12 +8,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import inlined, inner
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 BEYOND = 1e64
 """Root of the pivot of an unknown whose equation says nothing new."""

@@ -10,12 +10,10 @@ Source: Neumaier, Shcherbina, *Safe bounds in linear and mixed-integer linear pr
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner, kernel
 from lsu_mesh.kernels.runtime.rounding import gamma, up
-
-Array = NDArray[np.float64]
 
 
 @kernel

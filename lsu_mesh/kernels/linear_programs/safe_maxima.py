@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.linear_programs.dual_bound import absolute_row_sums, dual_bound_in
 from lsu_mesh.kernels.linear_programs.simplex import (
     balanced,
@@ -20,8 +21,6 @@ from lsu_mesh.kernels.linear_programs.simplex import (
 )
 from lsu_mesh.kernels.runtime.compile import inner, kernel
 from lsu_mesh.kernels.runtime.rounding import gamma, up
-
-Array = NDArray[np.float64]
 
 TIGHT = 0
 """Every bound is reached, to rounding, by a feasible point."""

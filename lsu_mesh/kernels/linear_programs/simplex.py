@@ -15,13 +15,10 @@ row that depends on the others. A nonbasic variable sits at the bound ``at[j] = 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array, Indices
 from lsu_mesh.kernels.runtime.compile import inlined, inner
 from lsu_mesh.kernels.runtime.scaling import unit_factor
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 FEASIBLE = 1e-12
 """How far a basic variable may be beyond its reach, as a share of it; also the tolerance of Harris' ratio test."""

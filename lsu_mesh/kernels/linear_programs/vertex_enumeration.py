@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array, Indices
 from lsu_mesh.kernels.linear_programs.safe_maxima import Program, vertex
 from lsu_mesh.kernels.linear_programs.simplex import basic_levels, climb
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 
-Array = NDArray[np.float64]
-Triangles = NDArray[np.int64]
+Triangles = Indices
 
 CONFIRMED = 1e-9
 """A triangle is done when no point lies farther beyond it than this."""

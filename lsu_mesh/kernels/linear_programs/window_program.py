@@ -7,23 +7,20 @@ equations at once, and it is well centred, whatever the data.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lsu_mesh.kernels.linear_programs.interior_point import (
+from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.kernels.linear_programs.banded_program import (
     IS_FIXED,
     NO_LIMIT,
     Limits,
     Point,
     Rows,
-    improve,
     is_equation,
     objective,
     row_values,
 )
+from lsu_mesh.kernels.linear_programs.interior_point import improve
 from lsu_mesh.kernels.runtime.compile import inner, kernel
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 MARGIN = 0.1
 """How far from its limits an unknown starts, as a share of their distance."""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes.strip_update import (
     EMPTY,
     OVERFLOW,
@@ -22,9 +20,6 @@ from lsu_mesh.kernels.runtime.compile import inlined, inner
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, up
 from lsu_mesh.kernels.runtime.scratch import BODY, BOX, DELTA, STRIP, Scratch, row, square
 from lsu_mesh.kernels.runtime.unowned_views import block
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 
 @inlined

@@ -9,18 +9,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes.box import tighten
 from lsu_mesh.kernels.parallelotopes.parallelotope import cut_all, faces
 from lsu_mesh.kernels.parallelotopes.strip_update import EMPTY, OVERFLOW, hull
 from lsu_mesh.kernels.runtime.compile import inlined, inner
 from lsu_mesh.kernels.runtime.rounding import down, up
 from lsu_mesh.kernels.runtime.scratch import BODY, BUNDLE, FACTOR, IDENTITY, Scratch, row, square
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 
 @inner

@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import inner
 from lsu_mesh.kernels.runtime.linear_algebra import invert, log_abs_determinant
 from lsu_mesh.kernels.runtime.rounding import EPSILON, up
@@ -28,9 +26,6 @@ from lsu_mesh.kernels.runtime.scratch import (
     square,
     weights_of,
 )
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 MAX_COMBINATIONS = 924.0
 """Combinations that an exhaustive search tries: those of 6 among 12 edges. More come of unknown inputs only."""

@@ -11,16 +11,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 from lsu_mesh.kernels.runtime.linear_algebra import invert, orthogonal_basis
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, UNIT_ROUNDOFF, gamma, up
 from lsu_mesh.kernels.runtime.scratch import BASIS, ENCLOSE, FACTOR, INVERSE, Scratch, columns_of, row, square
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 MAX_RESIDUAL = 0.25
 """An approximate inverse with a larger ‖I − M T‖∞ is not used."""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes.edge_selection import choose
 from lsu_mesh.kernels.parallelotopes.enclosure import MAX_RESIDUAL, enclose, inflate, residual_row
 from lsu_mesh.kernels.parallelotopes.strip_update import EMPTY, OVERFLOW, STRIP_ROWS, UNCHANGED, cut
@@ -15,9 +13,6 @@ from lsu_mesh.kernels.runtime.linear_algebra import invert
 from lsu_mesh.kernels.runtime.rounding import down, gamma, up
 from lsu_mesh.kernels.runtime.scratch import BUNDLE, DELTA, STRIP, Scratch, candidates_of, row, weights_of
 from lsu_mesh.kernels.runtime.unowned_views import block
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 IMAGE = 0
 CGZ = 1

@@ -8,14 +8,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, up
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 EMPTY = -1
 OVERFLOW = -2

@@ -7,13 +7,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Matrix
 from lsu_mesh.kernels.runtime.compile import inner, kernel
-
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 RANK_TOLERANCE = 1e-14
 """Columns whose residual falls below this share of the longest one take no direction of their own."""

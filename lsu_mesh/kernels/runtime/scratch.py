@@ -7,14 +7,12 @@ way (n + 3, n), and, for the columns of a zonotope, two matrices (n, 2 n + q) an
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import inlined
 from lsu_mesh.kernels.runtime.unowned_views import block, line
 
-Matrix = NDArray[np.float64]
-Vector = NDArray[np.float64]
-Scratch = NDArray[np.float64]
+Scratch = Vector
 
 # Vectors; each belongs to the functions of the group that names it and to nobody else.
 STRIP = 0  # 0, 1, 2: strip.cut

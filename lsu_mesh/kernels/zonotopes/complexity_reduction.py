@@ -8,9 +8,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import kernel
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import absorb_rows
 from lsu_mesh.kernels.zonotopes.constraint_elimination import drop_constraint
@@ -23,8 +21,6 @@ from lsu_mesh.kernels.zonotopes.lifted_zonotope import (
     without_zero_columns,
 )
 from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -12,13 +12,11 @@ no column is added.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner, kernel
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.zonotopes.zonotope import padded, subtraction_error
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.zonotopes.lifted_zonotope import row_scales
-
-Array = NDArray[np.float64]
 
 MIN_PIVOT = 2.0**-10
 """Entries of a scaled constraint row below this are not used to eliminate a variable."""

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array, Indices
 from lsu_mesh.kernels.runtime.compile import inner
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.runtime.scaling import unit_factor
 from lsu_mesh.kernels.zonotopes.lifted_zonotope import row_scales
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 MIN_PIVOT = 1e-9
 """A row whose scaled entries are all below this after elimination is not reached by the columns."""

@@ -11,13 +11,11 @@ rounded up. A multiple of a constraint row may be added to any row, since that r
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.runtime.scaling import unit_factor
-
-Array = NDArray[np.float64]
 
 
 @inner

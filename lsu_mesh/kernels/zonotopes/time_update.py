@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner, kernel
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, up
 from lsu_mesh.kernels.zonotopes.zonotope import absorb_box, padded
 
-Array = NDArray[np.float64]
 Body = tuple[Array, Array, Array, Array]
 
 

@@ -8,12 +8,10 @@ then makes that box part of the set.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import kernel
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
 from lsu_mesh.kernels.zonotopes.generator_reduction import approximate_inverse
-
-Array = NDArray[np.float64]
 
 
 @kernel

@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
-Matrix = NDArray[np.float64]
 CACHED_SECONDS, LEAST_CACHED = 6.0, 256
 """So much of the past a publisher keeps: the lease and a reconnection, with room."""
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.supports.support import Vector
 
 WIDEST = 1e9
 PRECISION = 0.01

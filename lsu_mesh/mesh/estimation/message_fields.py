@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
-from lsu_mesh.supports.support import Vector
 
 
 def described(engine: Filter) -> dict[str, Any]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.support import Support, Vector
+from lsu_mesh.supports.support import Support
 
 
 class OpenLoop:

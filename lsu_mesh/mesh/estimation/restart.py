@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.estimation.epochs import Epochs
@@ -16,7 +17,6 @@ from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, SOUND
 from lsu_mesh.mesh.messages import Fused, Input, Reference
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.support import Vector
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
@@ -34,7 +35,7 @@ from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key, start_keys
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.support import Support, Vector
+from lsu_mesh.supports.support import Support
 
 About = dict[str, str | int | float | None]
 START_GRACE = SECOND // 2

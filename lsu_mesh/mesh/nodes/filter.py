@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
@@ -31,7 +32,6 @@ from lsu_mesh.mesh.messages import (
 from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.sets import to_message
-from lsu_mesh.supports.support import Vector
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.fusion.fuse import fuse
@@ -21,7 +22,7 @@ from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, 
 from lsu_mesh.mesh.nodes.estimator import START_GRACE, WEAKNESS, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint
 from lsu_mesh.mesh.sets import to_support
-from lsu_mesh.supports.support import Support, Vector
+from lsu_mesh.supports.support import Support
 
 MAX_FAMILIES = 64
 """So many families of contradicting sources are tried, the largest first, to find out whom to leave out."""

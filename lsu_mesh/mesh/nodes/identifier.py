@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, LsuMeshError
 from lsu_mesh.filters.window.batch_map import Record
 from lsu_mesh.filters.window.structure import Structure
@@ -21,7 +22,6 @@ from lsu_mesh.mesh.messages import Input, Measurement, Message, Suggestion
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.support import Vector
 
 GIVEN_UP = 8
 """A step whose measurements have not all come when so many later ones have is looked at as it is."""

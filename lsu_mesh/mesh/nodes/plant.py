@@ -7,18 +7,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.mesh.access import PUBLISHES
 from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Input, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.rate_limit import RateLimit
-from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.nodes.schedule import MAX_AT_ONCE, Schedule
 from lsu_mesh.simulation import input_at, next_state, random_uniform
-from lsu_mesh.supports.support import Vector
 
-MAX_AT_ONCE = 64
-"""Steps published in one tick at the most, so that a late plant does not flood the mesh."""
 PAST_SECONDS, LEAST_PAST = 30.0, 256
 """So much of the past, and so many steps, a plant that starts late publishes the inputs of: filters need every one."""
 PAST_PACE_NS = 4_000_000

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+MAX_AT_ONCE = 64
+"""Steps that a source publishes in one tick at most, so that a source that is late does not flood the mesh."""
+
 
 @dataclass
 class Schedule:

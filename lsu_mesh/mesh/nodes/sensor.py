@@ -7,16 +7,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.config.settings import Configuration, SensorFault
 from lsu_mesh.mesh.messages import Measurement, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
-from lsu_mesh.mesh.nodes.plant import MAX_AT_ONCE
 from lsu_mesh.mesh.nodes.rate_limit import RateLimit
-from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.nodes.schedule import MAX_AT_ONCE, Schedule
 from lsu_mesh.simulation import measure, random_uniform
-from lsu_mesh.supports.support import Vector
 
 
 class SimulatedSensorNode(Node):

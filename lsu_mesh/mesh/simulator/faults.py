@@ -77,7 +77,7 @@ def draw_plan(
     names = [name for _, name in peers]
     rates = {kind: HIGHEST_RATE[kind] * rng.random() ** 2 for kind in chosen if kind in MESSAGE_FAULTS}
     outages = {
-        kind: _draw_outages(rng, kind, names, begin, end) if kind in chosen else ()
+        kind: _draw_outages(rng, kind, names, begin=begin, end=end) if kind in chosen else ()
         for kind in ("partition", "freeze", "kill")
     }
     skews = {}
@@ -87,7 +87,14 @@ def draw_plan(
             for role, name in peers
             if role != "plant" and rng.random() < 0.5
         }
-    return FaultPlan(end, rates, outages["partition"], outages["freeze"], outages["kill"], skews)
+    return FaultPlan(
+        end=end,
+        rates=rates,
+        partitions=outages["partition"],
+        freezes=outages["freeze"],
+        kills=outages["kill"],
+        skews=skews,
+    )
 
 
 def _draw_outages(rng: random.Random, kind: str, names: Sequence[str], begin: int, end: int) -> tuple[Outage, ...]:

@@ -59,7 +59,7 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
     witness = Invariants(configuration, true_states(configuration, steps + AFTERMATH))
     last_faulty = max(steps // 2, steps - RECOVERY_STEPS - JUDGED_STEPS)
     begin, end = (SimulatedMesh.start_time(configuration, step) for step in (0, last_faulty))
-    plan = draw_plan(rng, faults, configuration.peers(), begin, end)
+    plan = draw_plan(rng, faults, configuration.peers(), begin=begin, end=end)
     mesh = SimulatedMesh(configuration, plan, rng, witness)
     broken = ""
     try:
@@ -75,7 +75,7 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
         "partition": len(plan.partitions), "freeze": len(plan.freezes), "kill": len(plan.kills),
         "skew": len(plan.skews),
     }  # fmt: skip
-    return Outcome(seed, steps, broken, witness.sets, counts, str(variant))
+    return Outcome(seed=seed, steps=steps, broken=broken, sets=witness.sets, counts=counts, variant=str(variant))
 
 
 @functools.lru_cache(maxsize=512)
@@ -95,7 +95,7 @@ def true_states(configuration: Configuration, steps: int) -> NDArray[np.float64]
     X = np.empty((steps, model.state_count))
     for k in range(1, steps + 1):
         X[k - 1] = x
-        u = input_at(plant.inputs, seed, k, model.input_count, f"{plant.name}/input")
+        u = input_at(plant.inputs, seed, k, size=model.input_count, name=f"{plant.name}/input")
         x = next_state(model, x, u, random_uniform(seed, f"{plant.name}/process", k, model.rho.size))
     return X
 

@@ -8,8 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.mesh.messages import Input, Message, Posterior, Prediction, Reference, Truth
-from lsu_mesh.supports.support import Vector
 
 Kind = TypeVar("Kind", bound=Message)
 

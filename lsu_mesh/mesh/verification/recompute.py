@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
@@ -24,7 +25,6 @@ from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.provenance_steps import Brought, provenance_steps
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.support import Vector
 
 Fields = Mapping[str, Any]
 """Fields of a message and their values."""

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Matrix
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.identification import Explanation, explain, report
 from lsu_mesh.mesh.config import Configuration
@@ -23,7 +23,6 @@ from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
 from lsu_mesh_services.configuration import load_or_explain, print_warnings
 from lsu_mesh_services.exit_codes import FAILURE, NOT_MET, OK, USAGE
 
-Matrix = NDArray[np.float64]
 Rows = Mapping[int, Iterable[float | None]]
 
 

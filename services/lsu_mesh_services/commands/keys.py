@@ -54,7 +54,7 @@ def make_files(configuration: Configuration, hosts: Sequence[str], days: int) ->
     for name, (certificate, key) in pairs.items():
         if certificate.exists() and key.exists():
             continue
-        authority.issue(name, hosts, days, certificate, key)
+        authority.issue(name, hosts, days, certificate_file=certificate, key_file=key)
         made += [certificate, key]
     return made
 

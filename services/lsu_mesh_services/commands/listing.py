@@ -37,7 +37,7 @@ def _list(configuration: Configuration, options: argparse.Namespace) -> int:
     if options.json:
         _print_json(published, beats, roles, there)
     else:
-        _print_table(published, beats, roles, there, options.seconds)
+        _print_table(published, beats, roles, there=there, seconds=options.seconds)
     return OK
 
 

@@ -36,7 +36,7 @@ def _run(configuration: Configuration, options: argparse.Namespace) -> int:
     if options.role == "recorder":
         from lsu_mesh_services.recorder import run_recorder
 
-        return run_recorder(configuration, options.record, settings, options.stop, options.serve)
+        return run_recorder(configuration, options.record, settings, stop=options.stop, serve_port=options.serve)
     from lsu_mesh_services.peer import run_node
 
     return run_node(make_node(configuration, options), settings, options.stop)

@@ -49,7 +49,7 @@ def main(options: argparse.Namespace) -> int:
     if workers > 1 and len(seeds) > CHUNK:
         _interrupt_while_waiting(stop)
     try:
-        for outcome in run_seeds(path, seeds, options.steps, faults, workers):
+        for outcome in run_seeds(path, seeds, options.steps, faults=faults, workers=workers):
             tally.add(outcome)
             _tell(outcome, options)
             if stop or time.monotonic() > end:

@@ -165,7 +165,13 @@ class RunReport:
             return  # summed up already
         old = track.told.get(step)
         if old is None or old.boot != message.boot or message.revision >= old.revision:
-            track.told[step] = Told(message.boot, message.revision, message.point, message.lower, message.upper)
+            track.told[step] = Told(
+                boot=message.boot,
+                revision=message.revision,
+                point=message.point,
+                lower=message.lower,
+                upper=message.upper,
+            )
         if message.status == "inconsistent":
             track.inconsistent.add(step)
         truth = self._truth.get(step)

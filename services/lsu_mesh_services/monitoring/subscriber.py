@@ -78,9 +78,20 @@ class Watch:
             return None
         topic, name, size = address.topic, address.name, len(arrival.payload)
         if arrival.what != "sample":
-            return Heard(topic, name, arrival.arrival_ns, size, None, arrival.what == "alive")
+            return Heard(
+                topic=topic,
+                name=name,
+                arrival_ns=arrival.arrival_ns,
+                size=size,
+                message=None,
+                is_there=arrival.what == "alive",
+            )
         message = self.admission.admit(arrival.key, arrival.payload)
-        return None if message is None else Heard(topic, name, arrival.arrival_ns, size, message)
+        return (
+            None
+            if message is None
+            else Heard(topic=topic, name=name, arrival_ns=arrival.arrival_ns, size=size, message=message)
+        )
 
 
 @contextmanager

@@ -51,7 +51,9 @@ def certificates(configuration: Configuration, name: str) -> Certificates | None
             )
     _check_private(files[2])
     control = zenoh_access_control(configuration) if tls.access_control else None
-    return Certificates(files[0], files[1], files[2], tls.verify_hosts, control)
+    return Certificates(
+        authority=files[0], certificate=files[1], key=files[2], verify_hosts=tls.verify_hosts, access_control=control
+    )
 
 
 def missing_files(configuration: Configuration) -> list[str]:

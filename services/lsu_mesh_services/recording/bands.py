@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh_services.recording.palette import TRUTH, Color
 
-Array = NDArray[np.float64]
 _VISIBLE_BOUNDS = [False, True, False, True]
 
 

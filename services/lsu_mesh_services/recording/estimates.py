@@ -7,8 +7,8 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.mesh.messages import Posterior, Truth
 from lsu_mesh_services.recording.bands import band_columns, band_style, error_columns, error_style, line_style
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
@@ -18,7 +18,6 @@ from lsu_mesh_services.recording.timeline import Moment, Timelines
 REMEMBERED = 4096
 """Steps for which a truth waits for sets and sets wait for the truth."""
 
-Array = NDArray[np.float64]
 Kept = TypeVar("Kept")
 
 
@@ -66,7 +65,15 @@ class Estimates:
         """A posterior or a fused set."""
         moment = Moment(message.step, arrival_ns)
         latency = (arrival_ns - message.origin_ns) / 1e6
-        row = _Row(moment, message.lower, message.point, message.upper, message.log_volume, message.gain, latency)
+        row = _Row(
+            moment=moment,
+            lower=message.lower,
+            point=message.point,
+            upper=message.upper,
+            log_volume=message.log_volume,
+            gain=message.gain,
+            latency_ms=latency,
+        )
         self._rows[message.name].append(row)
         truth = self._truths.get(message.step)
         if truth is not None:

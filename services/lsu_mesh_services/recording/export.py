@@ -43,7 +43,7 @@ def tables(recording: Recording) -> dict[str, list[Row]]:
     truth = {m.step: m.x for m in (one.message for one in recording.received) if isinstance(m, Truth)}
     posteriors = [one for one in recording.received if isinstance(one.message, Posterior)]
     newest = {(one.message.src, one.message.step): one.message.reference for one in posteriors}
-    estimates = [_estimate(one, configuration, states, truth, newest) for one in posteriors]
+    estimates = [_estimate(one, configuration, states, truth=truth, newest=newest) for one in posteriors]
     listed = [{"step": k, "time": k * configuration.mesh.dt, **dict(zip(states, truth[k], strict=True))} for k in truth]
     return {"estimates": estimates, "truth": listed}
 

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import OTHER
 from lsu_mesh_services.recording.timeline import Moment, Timelines, one_row
@@ -24,8 +24,6 @@ UNIFORM = 5.0
 READABLE = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 MAX_RATIO = 4.0
 """A set wider than this many times the narrowest does not widen the common frame."""
-
-Array = NDArray[np.float64]
 
 
 def entity(name: str) -> str:

@@ -76,8 +76,14 @@ def read_recording(path: Path) -> Recording:
             received.append(Received(raw.arrival_ns, raw.key, raw.payload, message))
         elif admission.duplicates == duplicates:
             damaged.append(admission.last_refusal)
-    unknown = dict(admission.unknown_fields)
-    return Recording(files, description, configuration, received, damaged, unknown)
+    return Recording(
+        files=files,
+        description=description,
+        configuration=configuration,
+        received=received,
+        damaged=damaged,
+        unknown_fields=dict(admission.unknown_fields),
+    )
 
 
 def parts(path: Path) -> tuple[Path, ...]:

@@ -92,7 +92,7 @@ class Recorder:
         colors = palette.colors(configuration)
         self.path = path
         self._ledger = Ledger()
-        self._stream = stream = open_stream(names, path, run_properties, serve_port, continues)
+        self._stream = stream = open_stream(names, path, run_properties, serve_port=serve_port, continues=continues)
         self._raw = RawStore(stream, timelines)
         self._estimates = Estimates(stream, timelines, names, colors)
         self._space = Sets3D(stream, timelines, names, colors)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array, Indices
 from lsu_mesh.mesh.messages import (
     ConstrainedZonotopeMessage,
     IntersectionMessage,
@@ -22,9 +22,6 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 FLAT = 1e-9
 """A spread below this share of the largest counts as none."""

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.mesh.messages import Posterior, SupportMessage, Truth
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh_services.recording import frame
@@ -37,7 +37,6 @@ CROSS = 1.1
 IN_FRONT = 0.03
 """How far in front of flat sets the truth is drawn."""
 FLAT = rr.components.PointShading.Flat
-Array = NDArray[np.float64]
 
 
 class _Set(NamedTuple):

@@ -44,7 +44,7 @@ def replay_again(recording: Recording, options: argparse.Namespace) -> int:
             text = error.strerror or str(error)
             print(f"replay: cannot write {target}: {text}; choose another place with --record", file=sys.stderr)
             return COULD_NOT_START
-    _print(recording, replayed, made, seconds, target, options)
+    _print(recording, replayed, made, seconds=seconds, target=target, options=options)
     return OK if made else NOT_MET
 
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from lsu_mesh.array_types import Array
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.window.batch_map import batch_map, record
 from lsu_mesh.filters.window.highs import inequalities
@@ -18,7 +18,6 @@ from lsu_mesh.filters.window.structure import Structure, Unknown
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
-Array = NDArray[np.float64]
 E = np.array([[1.0, 0.5, 0.25], [0.0, 1.0, 0.3], [0.0, 0.0, 1.0]])
 F = np.array([[1.0, 0.4], [0.0, 1.0]])
 EVERY = tuple(
