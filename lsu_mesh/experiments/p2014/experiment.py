@@ -115,7 +115,7 @@ def jobs(seeds: range, steps: int) -> list[Job]:
         if length not in (5, 25)
         for seed in seeds[:OTHER_RUNS]
     ]
-    every += [Job(name, KNOWN, 0, "", factor, seed, steps) for name, factor in KALMAN.items() for seed in seeds]
+    every += [Job(name, KNOWN, 0, "centre", factor, seed, steps) for name, factor in KALMAN.items() for seed in seeds]
     return sorted(every, key=lambda job: (job.point != "vertex", -job.window))
 
 

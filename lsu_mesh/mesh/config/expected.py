@@ -76,11 +76,11 @@ def as_flag(value: Any) -> bool:
     raise Unfit("write true" if word in _TRUE else "write false" if word in _FALSE else "")
 
 
-def as_whole(value: Any, low: int | None = None, high: int | None = None) -> int:
+def as_whole(value: Any, low: int, high: int) -> int:
     """A whole number within limits; 20.0 is none."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise Unfit(_whole_remedy(value))
-    if (low is not None and value < low) or (high is not None and value > high):
+    if not low <= value <= high:
         raise Unfit
     return value
 
@@ -162,12 +162,9 @@ def choice(choices: Sequence[Any]) -> Expected[Any]:
     return Expected(f"one of {', '.join(shown(one) for one in choices)}", convert)
 
 
-def whole(low: int | None = None, high: int | None = None) -> Expected[int]:
+def whole(low: int, high: int) -> Expected[int]:
     """A whole number from ``low`` to ``high``."""
-    if low is None or high is None:
-        words = "a whole number" if low is None else f"a whole number ≥ {low}"
-    else:
-        words = f"a whole number ≥ {low}" if high == WHOLE_LIMIT else f"a whole number from {low} to {high}"
+    words = f"a whole number ≥ {low}" if high == WHOLE_LIMIT else f"a whole number from {low} to {high}"
     return Expected(words, lambda value: as_whole(value, low, high))
 
 

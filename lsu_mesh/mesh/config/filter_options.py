@@ -5,10 +5,11 @@ from __future__ import annotations
 import inspect
 import re
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from lsu_mesh.errors import ModelError
+from lsu_mesh.mesh.config.expected import Expected
 from lsu_mesh.mesh.config.model_errors import add_model_error
 from lsu_mesh.mesh.config.option_types import ANYTHING, expected_of
 from lsu_mesh.mesh.config.table import REQUIRED, Table
@@ -31,15 +32,24 @@ class FilterOptions:
         self.hints = _hints(cls)
 
     @property
+    def required(self) -> list[str]:
+        """Names of the options without a default."""
+        return [one.name for one in self.parameters if one.default is one.empty]
+
+    @property
     def names(self) -> list[str]:
         """Names of the options."""
         return [one.name for one in self.parameters]
+
+    def expected(self, name: str) -> Expected[Any]:
+        """What this option has to be."""
+        return expected_of(self.hints[name]) if name in self.hints else ANYTHING
 
     def read(self, table: Table) -> dict[str, Any]:
         """The options that the table gives, converted; notes each that is unknown, missing or not as expected."""
         options = table.rest() if self.takes_any else {}
         for parameter in self.parameters:
-            expected = expected_of(self.hints[parameter.name]) if parameter.name in self.hints else ANYTHING
+            expected = self.expected(parameter.name)
             default = REQUIRED if parameter.default is parameter.empty else None
             value = table.read(parameter.name, default, expected)
             if parameter.name in table.values:
@@ -57,19 +67,20 @@ def _hints(cls: type) -> dict[str, Any]:
         return {}
 
 
-def try_options(table: Table, make: Make, options: Mapping[str, Any]) -> None:
+def try_options(table: Table, make: Make, options: Mapping[str, Any], required: Collection[str]) -> None:
     """Make the filter; what its constructor refuses is noted, one option after the other.
 
-    A constructor tells one mistake at a time, so each option that it refuses is left out and the rest is tried again.
+    A constructor tells one mistake at a time, so each option that it refuses is left out and the rest is tried again,
+    unless it is one of those that are ``required``.
     """
     left = dict(options)
     while True:
         sentence = _refusal(make, left)
         if not sentence:
             return
-        key = _blamed(sentence, make, left)
+        key = _blamed(sentence, make, left, required)
         add_model_error(table, sentence, key)
-        if not key:
+        if not key or key in required:
             return
         del left[key]
 
@@ -85,13 +96,13 @@ def _refusal(make: Make, options: Mapping[str, Any]) -> str:
     return ""
 
 
-def _blamed(sentence: str, make: Make, options: Mapping[str, Any]) -> str:
+def _blamed(sentence: str, make: Make, options: Mapping[str, Any], required: Collection[str]) -> str:
     """The option that a sentence begins with, or names, or without which it is not said; empty for none."""
     words = re.findall(r"\w+", sentence)
     for name in (*words[:1], *options):
         if name in words and name in options:
             return str(name)
-    for name in options:
+    for name in [name for name in options if name not in required]:
         if _refusal(make, {key: value for key, value in options.items() if key != name}) != sentence:
             return str(name)
-    return ""
+    return next(iter(required)) if len(required) == 1 and set(required) <= options.keys() else ""

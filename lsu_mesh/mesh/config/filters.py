@@ -163,7 +163,7 @@ def _read_options(
     fine = {key: value for key, value in options.items() if not noted(table.path, key)}
     missing = any(noted(table.path, name) for name in own.names if name not in table.values)
     if not missing:
-        try_options(table, lambda chosen: cls(model, prior, **chosen), fine)  # type: ignore[call-arg]
+        try_options(table, lambda chosen: cls(model, prior, **chosen), fine, own.required)  # type: ignore[call-arg]
     return options
 
 

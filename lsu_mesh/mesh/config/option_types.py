@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.mesh.config import expected
-from lsu_mesh.mesh.config.expected import Expected, Unfit, as_list, as_text, is_number, is_real
+from lsu_mesh.mesh.config.expected import WHOLE_LIMIT, Expected, Unfit, as_list, as_text, is_number, is_real
 from lsu_mesh.supports.orthotope import Orthotope
 
 ANYTHING = Expected("a value that the class takes", lambda value: value)
@@ -33,7 +33,7 @@ def expected_of(hint: Any) -> Expected[Any]:
     """
     plain: dict[Any, Expected[Any]] = {
         bool: expected.FLAG,
-        int: expected.whole(),
+        int: WHOLE,
         float: expected.number(),
         str: expected.STRING,
         Path: Expected("a path", lambda value: Path(as_text(value))),
@@ -187,5 +187,6 @@ def _as_box(value: Any) -> Orthotope:
         raise Unfit(str(error)) from None
 
 
+WHOLE = Expected("a whole number", expected.whole(-WHOLE_LIMIT, WHOLE_LIMIT).convert)
 ARRAY = Expected("a number, or a list or matrix of numbers", _as_array)
 BOX = Expected("a box {lower = [numbers], upper = [numbers]}", _as_box)

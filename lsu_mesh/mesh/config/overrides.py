@@ -55,10 +55,10 @@ def apply(values: dict[str, Any], overrides: Sequence[Override], problems: Probl
     """Put each value in its place in ``values``, and remember where it came from."""
     for override in overrides:
         *tables, last = override.key.split(".")
-        table: Any = values
+        table: Any = values if tables and all((*tables, last)) else None
         for name in tables:
             table = table.setdefault(name, {}) if isinstance(table, dict) else None
-        if not isinstance(table, dict) or not all((*tables, last)) or not tables:
+        if not isinstance(table, dict):
             problems.add("", override.source, f"expected {FORM}", expected=FORM, found=_shortened(override.value))
             continue
         for other in _other_spellings(tables, last):

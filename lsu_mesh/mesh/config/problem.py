@@ -36,6 +36,11 @@ class Problem:
         return f"{self.file}: {line}{'warning: ' if self.is_warning else ''}{self.sentence}{source}"
 
     @property
+    def path(self) -> str:
+        """Table and key, like ``filters.cz.kind``."""
+        return f"{self.table}.{self.key}".strip(".")
+
+    @property
     def sentence(self) -> str:
         """Place and text, without the file."""
         place = " ".join(part for part in (f"[{self.table}]" if self.table else "", self.key) if part)
@@ -102,7 +107,7 @@ class Problems:
 
     def placed(self, problem: Problem) -> Problem:
         """The same with its line, or with the flag or variable that the value came from."""
-        path = f"{problem.table}.{problem.key}".strip(".")
+        path = problem.path
         source = self._source(path)
         if source:
             return replace(problem, source=source)
@@ -118,11 +123,9 @@ class Problems:
         return self.sources[within[-1]] if within and path else ""
 
     def are_in(self, table: str, *keys: str) -> bool:
-        """Whether a mistake of this table, of these keys if any are named, was noted."""
-        return any(
-            (one.table == table or one.table.startswith((f"{table}.", f"{table}["))) and (not keys or one.key in keys)
-            for one in self.records
-        )
+        """Whether a mistake at this table or inside of it, or at these keys of it if any are named, was noted."""
+        places = tuple(f"{table}.{key}" for key in keys) or (table,)
+        return any(one.path == at or one.path.startswith((f"{at}.", f"{at}[")) for one in self.records for at in places)
 
     def raise_if_any(self) -> None:
         """Raise :class:`ConfigurationError` when there was a mistake."""

@@ -44,7 +44,8 @@ def read_model(table: Table | None, problems: Problems) -> System:
         return System(prior=prior, input_box=input_box)
     count = len(A)
     _check_box("prior", prior, count, "state", problems)
-    _check_box("input_box", input_box, len(B[0]) if isinstance(B, list) else 0, "input", problems)
+    if isinstance(B, list) or "B" not in table.values:
+        _check_box("input_box", input_box, len(B[0]) if isinstance(B, list) else 0, "input", problems)
     if not is_read:
         return System(None, prior, input_box, count)
     try:
