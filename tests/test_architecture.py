@@ -78,7 +78,9 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [
-        ("table", "settings", "write", "measurement_files"),
+        ("problem", "toml_lines", "write", "measurement_files"),
+        ("expected", "settings"),
+        ("table",),
         (REST,),
         ("load",),
     ],

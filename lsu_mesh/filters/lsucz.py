@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,7 +84,7 @@ class LSUCZ(Filter):
         prior: Support | tuple[ArrayLike, ArrayLike],
         max_generators: int | None = 20,
         max_constraints: int | None = 8,
-        point: str = "hull",
+        point: Literal["hull", "nearest"] = "hull",
     ) -> None:
         n = model.state_count
         if point not in ("hull", "nearest"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,7 +81,7 @@ class ZonotopicKalman(Filter):
         model: LSUModel,
         prior: Support | tuple[ArrayLike, ArrayLike],
         order: int | None = 15,
-        form: str = "filter",
+        form: Literal["filter", "predictor"] = "filter",
     ) -> None:
         if form not in ("filter", "predictor"):
             raise ModelError(f'form must be "filter" or "predictor", it is {form!r}')

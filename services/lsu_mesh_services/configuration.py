@@ -25,7 +25,7 @@ def load_or_explain(file: str | None, options: argparse.Namespace) -> Configurat
 def print_warnings(configuration: Configuration) -> None:
     """One line per doubt on stderr."""
     for warning in configuration.warnings:
-        print(f"{configuration.path}: warning: {warning}", file=sys.stderr)
+        print(warning, file=sys.stderr)
 
 
 def flags(options: argparse.Namespace) -> list[str]:

@@ -125,7 +125,7 @@ def jobs(seeds: range, steps: int) -> list[Job]:
         for seed in seeds[:OTHER_RUNS]
     ]
     every += [
-        Job(name=name, case=KNOWN, window=0, point="", factor=factor, seed=seed, steps=steps)
+        Job(name=name, case=KNOWN, window=0, point="centre", factor=factor, seed=seed, steps=steps)
         for name, factor in KALMAN.items()
         for seed in seeds
     ]

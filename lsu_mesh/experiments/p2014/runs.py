@@ -10,6 +10,7 @@ import numpy as np
 from lsu_mesh.array_types import Array, Flags
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.truncated_kalman import TruncatedKalman
+from lsu_mesh.filters.window.program import Selected
 from lsu_mesh.filters.window.window_map import WindowMAP
 from lsu_mesh.model import LSUModel
 
@@ -47,7 +48,7 @@ class Job(NamedTuple):
     name: str
     case: Case
     window: int
-    point: str
+    point: Selected
     factor: float
     seed: int
     steps: int

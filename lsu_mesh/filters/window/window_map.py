@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, cast
+from typing import ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -73,8 +73,8 @@ class WindowMAP(Filter):
         unknown: UnknownEntries = (),
         kappa: float = 1.0,
         handover: float = 1.0,
-        objective: str = "sum",
-        point: str = "centre",
+        objective: Literal["sum", "log"] = "sum",
+        point: Selected = "centre",
         rho_range: tuple[ArrayLike, ArrayLike] = (0.0, np.inf),
         r_range: tuple[ArrayLike, ArrayLike] = (0.0, np.inf),
     ) -> None:
@@ -92,7 +92,7 @@ class WindowMAP(Filter):
         self._program = WindowProgram(self._structure, HalfWidths.separate(low, high, np.ones(low.size)))
         self._model, self._length = model, window
         self._kappa, self._handover, self._objective = kappa, handover, objective
-        self._point = cast("Selected", point)
+        self._point = point
         self.reset(checked_prior(model, prior))
 
     @property

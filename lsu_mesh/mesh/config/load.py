@@ -6,23 +6,21 @@ Precedence: flag (``-X table.key=value``) > environment (``LSU_MESH_TABLE__KEY``
 from __future__ import annotations
 
 import copy
+import math
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lsu_mesh.mesh.config.expected import shown
+from lsu_mesh.mesh.config.filters import kind_of, read_filter
+from lsu_mesh.mesh.config.fusion import check_learning, read_fusion, read_identifier, shared_sensor_warnings
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
-from lsu_mesh.mesh.config.peers import (
-    check_learning,
-    is_guaranteed,
-    read_filter,
-    read_fusion,
-    read_identifier,
-    read_plant,
-    read_sensor,
-    shared_sensor_warnings,
-)
+from lsu_mesh.mesh.config.overrides import apply, from_environment, from_flags
+from lsu_mesh.mesh.config.problem import ConfigurationError, Problem, Problems
+from lsu_mesh.mesh.config.sensors import read_plant, read_sensor
 from lsu_mesh.mesh.config.settings import (
     Configuration,
     MeshSettings,
@@ -30,10 +28,9 @@ from lsu_mesh.mesh.config.settings import (
     SupervisorSettings,
 )
 from lsu_mesh.mesh.config.system import read_model
-from lsu_mesh.mesh.config.table import ConfigurationError, Problems, Table
+from lsu_mesh.mesh.config.table import Table
+from lsu_mesh.mesh.config.toml_lines import key_lines
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
-
-ENVIRONMENT_PREFIX = "LSU_MESH_"
 
 
 def load(
@@ -48,27 +45,27 @@ def load(
     Raises
     ------
     ConfigurationError
-        With one line per mistake: file, table, key, what was expected, the nearest valid name.
+        With one record per mistake: file, table, key, what was found and expected, the nearest valid name, the line.
     """
-    problems = Problems(str(path), reads_files=reads_files)
-    return _load(path, overrides, environment, problems)
+    return _load(path, overrides, environment, reads_files)[0]
 
 
 def load_with_keys(
     path: Path, overrides: Sequence[str] = (), environment: Mapping[str, str] | None = None
 ) -> tuple[Configuration, set[str]]:
     """The configuration and the paths of all keys that the schema knows for it."""
-    problems = Problems(str(path))
-    return _load(path, overrides, environment, problems), problems.asked
+    return _load(path, overrides, environment, True)
 
 
 def _load(
-    path: Path, overrides: Sequence[str], environment: Mapping[str, str] | None, problems: Problems
-) -> Configuration:
-    values = _read_toml(path)
-    _apply(values, _from_environment(environment or {}), "environment", problems)
-    _apply(values, [_split(text) for text in overrides], "-X", problems)
-    return _checked(values, path, problems)
+    path: Path, overrides: Sequence[str], environment: Mapping[str, str] | None, reads_files: bool
+) -> tuple[Configuration, set[str]]:
+    text = _read_text(path)
+    values = _read_toml(path, text)
+    problems = Problems(str(path), reads_files=reads_files, lines=key_lines(text))
+    apply(values, from_environment(environment or {}), problems)
+    apply(values, from_flags(overrides, problems), problems)
+    return _checked(values, path, problems), problems.asked
 
 
 def load_values(
@@ -80,7 +77,7 @@ def load_values(
     only if ``reads_files``: those of a recorded run may be gone. Raises :class:`ConfigurationError`.
     """
     problems, copied = Problems(str(path), reads_files=reads_files), copy.deepcopy(dict(values))
-    _apply(copied, [_split(text) for text in overrides], "-X", problems)
+    apply(copied, from_flags(overrides, problems), problems)
     return _checked(copied, path, problems)
 
 
@@ -92,45 +89,30 @@ def _checked(values: dict[str, Any], path: Path, problems: Problems) -> Configur
     return replace(configuration, values=original)
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def _read_text(path: Path) -> str:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigurationError([f"{path}: not a TOML file: {error}"]) from None
+        return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise ConfigurationError([f"{path}: not UTF-8 text: {error}"]) from None
-    except OSError as error:
-        raise ConfigurationError([f"{path}: cannot be read: {error.strerror}"]) from None
+        raise _unreadable(path, f"not UTF-8 text: {error}", "UTF-8 text") from None
+    except (OSError, ValueError) as error:  # ValueError: a path with a null character
+        text = f"cannot be read: {getattr(error, 'strerror', None) or error}"
+        raise _unreadable(path, text, "a file that can be read") from None
 
 
-def _split(text: str) -> tuple[str, str]:
-    key, sign, value = text.partition("=")
-    if not sign:
-        raise ConfigurationError([f"-X {text}: expected table.key=value, such as mesh.steps=100"])
-    return key.strip(), value.strip()
+def _read_toml(path: Path, text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise _unreadable(path, "not a TOML file: lists or tables are nested too deep", "a TOML file") from None
+    except ValueError as error:  # TOMLDecodeError, or a whole number with too many digits for Python
+        place = re.search(r"\(at line ([0-9]+), column [0-9]+\)", str(error))
+        ends = "(at end of document)" in str(error)
+        line = int(place[1]) if place else text.count("\n") + 1 if ends else None
+        raise _unreadable(path, f"not a TOML file: {error}", "a TOML file", line) from None
 
 
-def _from_environment(environment: Mapping[str, str]) -> list[tuple[str, str]]:
-    return [
-        (name.removeprefix(ENVIRONMENT_PREFIX).lower().replace("__", "."), value)
-        for name, value in sorted(environment.items())
-        if name.startswith(ENVIRONMENT_PREFIX) and "__" in name
-    ]
-
-
-def _apply(values: dict[str, Any], changes: Sequence[tuple[str, str]], source: str, problems: Problems) -> None:
-    for key, text in changes:
-        *tables, last = key.split(".")
-        table: Any = values
-        for name in tables:
-            table = table.setdefault(name, {}) if isinstance(table, dict) else None
-        if not isinstance(table, dict) or not tables:
-            problems.add(f"{source} {key}", "expected table.key=value, such as mesh.steps=100")
-            continue
-        try:
-            table[last] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            table[last] = text  # a bare word is a string
+def _unreadable(path: Path, text: str, expected: str, line: int | None = None) -> ConfigurationError:
+    return ConfigurationError([Problem(str(path), "", "", text, expected, line=line)])
 
 
 def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configuration | None:
@@ -138,35 +120,45 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     mesh = _read_mesh(root)
     system = read_model(root.table("model", required=True), problems)
     model, prior, input_box = system.model, system.prior, system.input_box
-    sensors = {
-        name: read_sensor(table, name, system.state_count, path.parent)
-        for name, table in _named(root, "sensors", problems).items()
-    }
+    sensor_tables = _named(root, "sensors", problems)
+    sensors = {n: read_sensor(t, n, system.state_count, path.parent) for n, t in sensor_tables.items()}
     plant = read_plant(root.table("plant"), model, sensors, path.parent, problems)
     filter_tables, fusion_tables = _named(root, "filters", problems), _named(root, "fusion", problems)
     identifier_tables = _named(root, "identifier", problems)
-    sound = [name for name, table in filter_tables.items() if is_guaranteed(table.values.get("kind"))]
+    kinds = {name: kind_of(table) for name, table in filter_tables.items()}
+    sound = [name for name, kind in kinds.items() if kind.is_guaranteed]
     peers = {"filters": sound, "fusion": list(fusion_tables), "identifier": list(identifier_tables)}
-    filters = {name: read_filter(table, name, sensors, model, prior, peers) for name, table in filter_tables.items()}
+    filters = {
+        name: read_filter(table, name, kinds[name], sensors, system, peers) for name, table in filter_tables.items()
+    }
     fusion = {name: read_fusion(table, name, filters, peers) for name, table in fusion_tables.items()}
     identifiers = {name: read_identifier(table, name, sensors) for name, table in identifier_tables.items()}
     check_learning(filters, fusion, identifiers, sound, problems)
     recorder, network = _read_recorder(root), read_network(root)
     supervisor = _read_supervisor(root)
     root.finish()
-    names = [*sensors, *filters, *fusion, *identifiers, *([plant.name] if plant else []), "recorder"]
+    names = [
+        *((f"sensors.{name}", name) for name in sensors),
+        *((f"filters.{name}", name) for name in filters),
+        *((f"fusion.{name}", name) for name in fusion),
+        *((f"identifier.{name}", name) for name in identifiers),
+        *([("plant", plant.name)] if plant else []),
+        ("recorder", "recorder"),
+    ]
     _check_names(names, problems)
     check_reserved(network, names, problems)
     if any(s.file and s.file.indexed_by == "time" for s in sensors.values()) and mesh.start_time is None:
-        problems.add("[mesh] start_time", "is missing; files with a time column need it: step = (t − start_time)/dt")
+        text = "is missing; files with a time column need it: step = (t − start_time)/dt"
+        problems.add("mesh", "start_time", text, expected="a finite number, in seconds since 1970")
     if model is None or prior is None:
-        if not problems.lines:
-            problems.add("[model]", "no model could be made")
+        if not problems.records:
+            problems.add("model", "", "no model could be made", expected="A, rho and [model.prior]")
         return None
     return Configuration(
         path, mesh, model, prior, input_box, plant, dict(sorted(sensors.items())), dict(sorted(filters.items())),
         dict(sorted(fusion.items())), recorder, network, supervisor,
-        (*shared_sensor_warnings(filters, fusion), *open_endpoint_warnings(network)),
+        tuple(map(problems.placed, (*shared_sensor_warnings(problems.file, filters, fusion),
+                                    *open_endpoint_warnings(problems.file, network)))),
         identifiers=dict(sorted(identifiers.items())),
     )  # fmt: skip
 
@@ -175,8 +167,10 @@ def _read_mesh(root: Table) -> MeshSettings:
     table = root.table("mesh", required=True) or Table({"name": "mesh", "dt": 1.0}, "mesh", root.problems)
     name = table.text("name")
     if isinstance(name, str) and not is_name(name):
-        table.wrong("name", f'"{name}" is no name; expected {NAME_RULE}')
+        table.wrong("name", f'"{name}" is no name; expected {NAME_RULE}', NAME_RULE)
     dt = table.number("dt", above=0.0)
+    if isinstance(dt, float) and not math.isfinite(1.0 / dt):
+        table.mismatch("dt", "a number whose inverse, the steps per second, is finite", f"{dt:g}")
     steps = table.whole("steps", None, low=1)
     seed = table.whole("seed", 1)
     rate = table.number("rate", 1.0 / dt if isinstance(dt, float) else 1.0, above=0.0)
@@ -194,7 +188,8 @@ def _named(root: Table, key: str, problems: Problems) -> dict[str, Table]:
         if is_name(name):
             named[name] = Table(values, f"{key}.{name}", problems)
         else:
-            problems.add(f"[{key}.{name}]", f'"{name}" is no name; expected {NAME_RULE}')
+            text = f'"{name}" is no name; expected {NAME_RULE}'
+            problems.add(f"{key}.{name}", "", text, expected=NAME_RULE, found=shown(name))
     return named
 
 
@@ -221,6 +216,10 @@ def _read_supervisor(root: Table) -> SupervisorSettings:
     return SupervisorSettings(restart, backoff, limit)
 
 
-def _check_names(names: Sequence[str], problems: Problems) -> None:
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        problems.add("", f'two peers are called "{name}"; every peer of a mesh needs a name of its own')
+def _check_names(names: Sequence[tuple[str, str]], problems: Problems) -> None:
+    first: dict[str, str] = {}
+    for table, name in names:
+        if name in first:
+            text = f'two peers are called "{name}", here and in [{first[name]}]; give each a name of its own'
+            problems.add(table, "", text, expected="a name that no other peer of the mesh has", found=shown(name))
+        first.setdefault(name, table)

@@ -5,12 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
+from lsu_mesh.mesh.config.expected import shown
+from lsu_mesh.mesh.config.problem import Problem, Problems
 from lsu_mesh.mesh.config.settings import NetworkSettings, TlsSettings
-from lsu_mesh.mesh.config.table import Problems, Table
+from lsu_mesh.mesh.config.table import Table
 from lsu_mesh.mesh.keys import RESERVED
 
 PROTOCOLS = ("tcp", "tls", "udp", "quic", "unixsock-stream")
+EXAMPLE = '"tcp/127.0.0.1:7447"'
 ENCRYPTED = ("tls", "quic")
+SECRET = "-----BEGIN"
+"""How certificates and keys begin, which are no part of a configuration."""
 ANYWHERE = re.compile(r"/(0\.0\.0\.0|\[::\]):")
 LOOPBACK = re.compile(r"127(\.\d+){3}|localhost|\[::1\]")
 
@@ -43,10 +48,12 @@ def read_network(root: Table) -> NetworkSettings:
 def _check_endpoints(table: Table, key: str, endpoints: Iterable[str], encrypted: bool) -> None:
     for endpoint in endpoints:
         if protocol_of(endpoint) not in PROTOCOLS or "/" not in endpoint or ":" not in endpoint:
-            table.wrong(key, f'"{endpoint}" is no endpoint; expected one such as "tcp/127.0.0.1:7447"')
+            text = f"{shown(endpoint)} is no endpoint; expected one such as {EXAMPLE}"
+            table.wrong(key, text, f"an endpoint such as {EXAMPLE}")
         elif encrypted and protocol_of(endpoint) not in ENCRYPTED:
-            address = endpoint.partition("/")[2]
-            table.wrong(key, f'"{endpoint}" is not encrypted, and network.tls is enabled; expected "tls/{address}"')
+            encrypted_one = shown(f"tls/{endpoint.partition('/')[2]}")
+            text = f"{shown(endpoint)} is not encrypted, and network.tls is enabled; expected {encrypted_one}"
+            table.wrong(key, text, encrypted_one)
 
 
 def _read_tls(network: Table) -> TlsSettings:
@@ -56,27 +63,35 @@ def _read_tls(network: Table) -> TlsSettings:
     certificate = table.text("certificate", TlsSettings.certificate)
     key = table.text("key", TlsSettings.key)
     for option, text in (("authority", authority), ("certificate", certificate), ("key", key)):
-        if "-----BEGIN" in text:
+        if SECRET in text:
             table.values[option] = "…"
-            table.wrong(option, "holds a certificate or key itself; a configuration holds no secret: name its file")
+            text = "holds a certificate or key itself; a configuration holds no secret: name its file"
+            table.wrong(option, text, "the name of a file")
     access_control = table.flag("access_control", TlsSettings.access_control)
     verify_hosts = table.flag("verify_hosts", TlsSettings.verify_hosts)
     table.finish()
     return TlsSettings(enabled, authority, certificate, key, access_control, verify_hosts)
 
 
-def check_reserved(network: NetworkSettings, names: Sequence[str], problems: Problems) -> None:
-    """Where certificates carry names, some are taken."""
-    for name in sorted(set(names) & set(RESERVED)) if network.tls.enabled else ():
-        problems.add("", f'no peer can be called "{name}" with network.tls: certificates use that name; choose another')
+def check_reserved(network: NetworkSettings, names: Sequence[tuple[str, str]], problems: Problems) -> None:
+    """Where certificates carry names, some are taken; ``names`` are pairs of table and name."""
+    for table, name in names:
+        if network.tls.enabled and name in RESERVED:
+            text = f'no peer can be called "{name}" with network.tls: certificates use that name; choose another'
+            problems.add(table, "", text, expected=f"a name other than {', '.join(RESERVED)}", found=shown(name))
 
 
-def open_endpoint_warnings(network: NetworkSettings) -> list[str]:
+def open_endpoint_warnings(file: str, network: NetworkSettings) -> list[Problem]:
     """Endpoints of the file that a peer listens on only when it is told that this is meant."""
+    text = (
+        "can be reached from other hosts without TLS: listening there is refused without --insecure; enable network.tls"
+    )
     return [
-        f"[network] {key}: {endpoint} can be reached from other hosts without TLS: listening there is refused "
-        "without --insecure; enable network.tls"
+        Problem(
+            file, "network", key, f"{endpoint} {text}", "an endpoint with TLS, or of this host only", shown(endpoint),
+            is_warning=True,
+        )
         for key, endpoints in (("entry", (network.entry,)), ("listen", network.listen))
         for endpoint in endpoints
         if is_open_to_others(endpoint) and (key == "listen" or ANYWHERE.search(endpoint))
-    ]
+    ]  # fmt: skip

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.mesh.config.table import Problems, Table
+from lsu_mesh.mesh.config.model_errors import add_model_error
+from lsu_mesh.mesh.config.problem import Problems
+from lsu_mesh.mesh.config.table import Table
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
@@ -29,11 +31,11 @@ def read_model(table: Table | None, problems: Problems) -> System:
     """The table ``[model]``; notes all its mistakes."""
     if table is None:
         return System()
-    before = len(problems.lines)
+    before = len(problems.records)
     A, B, rho = table.matrix("A"), table.matrix("B", None), _widths(table)
     noise_map = table.matrix("noise_map", None)
     names = {key: table.texts(key, None) for key in ("states", "inputs", "units")}
-    is_read = len(problems.lines) == before
+    is_read = len(problems.records) == before
     domain = read_box(table.table("domain"), problems)
     input_box = read_box(table.table("input_box"), problems)
     prior = read_box(table.table("prior", required=True), problems)
@@ -42,20 +44,22 @@ def read_model(table: Table | None, problems: Problems) -> System:
         return System(prior=prior, input_box=input_box)
     count = len(A)
     _check_box("prior", prior, count, "state", problems)
-    _check_box("input_box", input_box, len(B[0]) if isinstance(B, list) else 0, "input", problems)
+    if isinstance(B, list) or "B" not in table.values:
+        _check_box("input_box", input_box, len(B[0]) if isinstance(B, list) else 0, "input", problems)
     if not is_read:
         return System(None, prior, input_box, count)
     try:
         return System(LSUModel(A, B, [], rho, [], noise_map, domain, **names), prior, input_box, count)
     except ModelError as error:
         for problem in error.problems:
-            problems.add("[model]", problem)
+            add_model_error(table, problem)
         return System(None, prior, input_box, count)
 
 
 def _check_box(key: str, box: Orthotope | None, count: int, of: str, problems: Problems) -> None:
     if box is not None and box.dim != count:
-        problems.add(f"[model.{key}]", f"expected {count} coordinates, one per {of}, found {box.dim}")
+        expected = f"{count} coordinates, one per {of}"
+        problems.add(f"model.{key}", "", f"expected {expected}, found {box.dim}", expected=expected, found=str(box.dim))
 
 
 def _widths(table: Table) -> Any:
@@ -75,5 +79,5 @@ def read_box(table: Table | None, problems: Problems) -> Orthotope | None:
     try:
         return Orthotope(lower, upper)
     except ModelError as error:
-        problems.add(f"[{table.path}]", str(error))
+        add_model_error(table, str(error))
         return None

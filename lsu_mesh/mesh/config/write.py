@@ -19,7 +19,7 @@ def to_toml(values: Mapping[str, Any]) -> str:
 def _lines(table: Mapping[str, Any], path: str) -> list[str]:
     plain = {key: value for key, value in table.items() if not isinstance(value, Mapping)}
     lines = [f"\n[{path}]"] if path and (plain or not table) else []
-    lines += [f"{_key(key)} = {_value(value)}" for key, value in plain.items()]
+    lines += [f"{_key(key)} = {value_text(value)}" for key, value in plain.items()]
     for key, value in table.items():
         if isinstance(value, Mapping):
             lines += _lines(value, f"{path}.{_key(key)}" if path else _key(key))
@@ -30,11 +30,12 @@ def _key(text: str) -> str:
     return text if BARE.fullmatch(text) else _text(text)
 
 
-def _value(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """TOML text of one value; raises ``TypeError`` for what TOML has no text for here, as dates."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(inner)}" for key, inner in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {value_text(inner)}" for key, inner in value.items()) + " }"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
+        return "[" + ", ".join(map(value_text, value)) + "]"
     if isinstance(value, float) and not math.isfinite(value):
         return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
     if isinstance(value, str):

@@ -246,7 +246,7 @@ class FilterNode(Estimator):
         self._counts["contradictions"] += 1
         if not self._is_tested:
             return Updated("inconsistent", cause=str(error), messages=self._refuse_start(k, y, error, now))
-        if self.settings.on_contradiction == "widen":
+        if self.settings.on_inconsistency == "widen":
             self._widened = widen(self.engine, y)
             if self._widened is not None:
                 self.downgrade_guarantee("learned")
@@ -276,7 +276,7 @@ class FilterNode(Estimator):
         self._inconsistent.add(k)
         dropped = update_without_contradicting_strips(self.engine, y)
         messages = [self._dropped_event(k, row, y, dropped, now) for row in (*dropped.alone, *dropped.together)]
-        if self.settings.on_contradiction == "reset" and len(self._inconsistent) >= self.settings.reset_after:
+        if self.settings.on_inconsistency == "reset" and len(self._inconsistent) >= self.settings.reset_after:
             messages.append(self._reset(k, y, now))
         return messages
 

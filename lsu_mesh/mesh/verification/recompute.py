@@ -189,7 +189,7 @@ class FilterRecomputation(Recomputation):
         epochs = [epoch for epoch in engines if epoch <= recorded.epoch]
         if epochs:
             return engines[max(epochs)]
-        if self._settings.adopt and recorded.guarantee == "learned" and self._settings.on_contradiction != "widen":
+        if self._settings.adopt and recorded.guarantee == "learned" and self._settings.on_inconsistency != "widen":
             raise Unverifiable("the message whose bounds were adopted is not in the recording")
         return self._declared
 
@@ -235,7 +235,7 @@ class FilterRecomputation(Recomputation):
         try:
             self._engine.update(y)
         except InconsistentData:
-            if self._settings.on_contradiction == "widen":
+            if self._settings.on_inconsistency == "widen":
                 factor = widen(self._engine, y)
                 if factor is not None:
                     return "ok", factor

@@ -171,7 +171,12 @@ def certificates(configuration: Configuration) -> Iterator[Check]:
     if configuration.network.tls.enabled:
         missing = missing_files(configuration)
         if missing:
-            yield Check("certificates", "fail", "; ".join(missing), f"lsu-mesh keys init {configuration.path}")
+            yield Check(
+                "certificates",
+                "fail",
+                "; ".join(one.sentence for one in missing),
+                f"lsu-mesh keys init {configuration.path}",
+            )
         else:
             yield Check("certificates", "ok", "all there")
 

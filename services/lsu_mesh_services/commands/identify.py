@@ -17,7 +17,7 @@ from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.identification import Explanation, explain, report
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.measurement_files import read_playback
-from lsu_mesh.mesh.config.table import nearest
+from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
 from lsu_mesh_services.configuration import load_or_explain, print_warnings

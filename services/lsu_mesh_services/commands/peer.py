@@ -9,7 +9,7 @@ import threading
 import time
 
 from lsu_mesh.mesh.config import Configuration
-from lsu_mesh.mesh.config.table import nearest
+from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh_services.configuration import load_or_explain

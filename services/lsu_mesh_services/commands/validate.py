@@ -6,10 +6,13 @@ import argparse
 import json
 import os
 import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from lsu_mesh.mesh.config import ConfigurationError, load
-from lsu_mesh_services.configuration import print_problems, print_warnings
+from lsu_mesh.mesh.config import Configuration, ConfigurationError, load
+from lsu_mesh_services.configuration import print_problems
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.network.security import missing_files
 
@@ -19,19 +22,34 @@ def main(options: argparse.Namespace) -> int:
         configuration = load(Path(options.file), options.overrides, os.environ)
     except ConfigurationError as error:
         if options.json:
-            print(json.dumps({"valid": False, "problems": list(error.problems)}))
+            _print_lines([record.as_record() for record in error.records])
         else:
             print_problems(error)
         return USAGE
-    print_warnings(configuration)
-    for missing in missing_files(configuration):
-        print(f"{configuration.path}: warning: {missing}", file=sys.stderr)
-    peers = [f"{role} {name}" for role, name in configuration.peers()]
+    warnings = [*configuration.warnings, *missing_files(configuration)]
     if options.json:
-        print(json.dumps({"valid": True, "mesh": configuration.mesh.name, "peers": peers}))
-    else:
-        print(
-            f"{options.file}: fine; mesh {configuration.mesh.name!r} with {len(peers)} peers: {', '.join(peers)}",
-            file=sys.stderr,
-        )
+        _print_lines([*(warning.as_record() for warning in warnings), _summary(configuration, len(warnings))])
+        return OK
+    peers = [f"{role} {name}" for role, name in configuration.peers()]
+    fine = f"{options.file}: fine; mesh {configuration.mesh.name!r} with {len(peers)} peers: {', '.join(peers)}"
+    print(*warnings, fine, sep="\n", file=sys.stderr)
     return OK
+
+
+def _summary(configuration: Configuration, warnings: int) -> dict[str, Any]:
+    """The line of a file that is fine: names and counts."""
+    counts = Counter(role for role, _ in configuration.peers())
+    return {
+        "level": "fine",
+        "file": str(configuration.path),
+        "mesh": configuration.mesh.name,
+        "states": configuration.base_model.state_count,
+        "peers": dict(sorted(counts.items())),
+        "mistakes": 0,
+        "warnings": warnings,
+    }
+
+
+def _print_lines(records: Sequence[Mapping[str, Any]]) -> None:
+    for record in records:
+        print(json.dumps(record))

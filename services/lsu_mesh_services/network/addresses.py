@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.mesh.config import Configuration
-from lsu_mesh.mesh.config.table import nearest
+from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.flows import flows
 from lsu_mesh.mesh.keys import PREFIX
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.network import is_open_to_others
+from lsu_mesh.mesh.config.problem import Problem
 from lsu_mesh.mesh.config.table import file_at
 from lsu_mesh_services.network.access_control import zenoh_access_control
 
@@ -56,17 +57,24 @@ def certificates(configuration: Configuration, name: str) -> Certificates | None
     )
 
 
-def missing_files(configuration: Configuration) -> list[str]:
-    """The authority, and the peers whose files are on other hosts or not made yet; one line each."""
+def missing_files(configuration: Configuration) -> list[Problem]:
+    """The authority, and the peers whose files are on other hosts or not made yet; one warning each."""
     tls = configuration.network.tls
     if not tls.enabled:
         return []
     authority = certificate_file(configuration, tls.authority, "")
     if not authority.is_file():
-        return [f"[network.tls] authority: there is no {authority}; `lsu-mesh keys init {configuration.path}` makes it"]
+        text = f"there is no {authority}; `lsu-mesh keys init {configuration.path}` makes it"
+        return [_missing(configuration, "authority", tls.authority, text)]
     names = [name for _, name in configuration.peers()]
     elsewhere = [name for name in names if not certificate_file(configuration, tls.key, name).is_file()]
-    return [f"[network.tls] key: no file on this host for {', '.join(elsewhere)}"] if elsewhere else []
+    text = f"no file on this host for {', '.join(elsewhere)}"
+    return [_missing(configuration, "key", tls.key, text)] if elsewhere else []
+
+
+def _missing(configuration: Configuration, key: str, found: str, text: str) -> Problem:
+    file = str(configuration.path)
+    return Problem(file, "network.tls", key, text, "a file on this host", f'"{found}"', is_warning=True)
 
 
 def certificate_file(configuration: Configuration, text: str, name: str) -> Path:

@@ -9,6 +9,6 @@ def add(commands: Commands) -> None:
     """The command ``validate``."""
     parser = new_command(commands, "validate", "check a configuration and its files; start nothing")
     parser.add_argument("file", metavar="mesh.toml", help="configuration to check")
-    parser.add_argument("--json", action="store_true", help="JSON lines on stdout")
+    parser.add_argument("--json", action="store_true", help="JSON lines on stdout: one per mistake and warning")
     add_overrides(parser)
     parser.set_defaults(handler="lsu_mesh_services.commands.validate", extra=None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -25,9 +26,14 @@ def problems(demo: Path, tmp_path: Path) -> Problems:
         file.write_text(text)
         with pytest.raises(ConfigurationError) as caught:
             load(file, overrides or [])
-        return [line.removeprefix(f"{tmp_path}/") for line in caught.value.problems]
+        return [without_line(line.removeprefix(f"{tmp_path}/")) for line in caught.value.problems]
 
     return find
+
+
+def without_line(text: str) -> str:
+    """A problem's text without the line, of which ``test_problem.py`` knows more."""
+    return re.sub(r"^mesh\.toml: line \d+: ", "mesh.toml: ", text)
 
 
 def test_the_demo_is_valid_and_sensors_are_in_the_order_of_their_names(demo: Path) -> None:
@@ -61,9 +67,9 @@ def test_all_mistakes_of_a_model_are_told_at_once_and_sensors_are_checked_beside
         ("C = [[1.0, 0.0, 0.5]]", "C = [[1.0, 0.0]]"),
     )
     expected = (
-        "[model.prior]: lower must",
-        "[model]: rho must have 3",
-        "[model]: states must have 3",
+        "[model.prior] lower: must",
+        "[model] rho: must have 3",
+        "[model] states: must have 3",
         "[sensors.s1] C: expected 3",
     )
     assert len(found) == len(expected), found
@@ -78,19 +84,19 @@ def test_all_mistakes_of_a_model_are_told_at_once_and_sensors_are_checked_beside
         ("dt = 0.02", "dt = nan", "[mesh] dt: expected a number > 0, found nan"),
         ("dt = 0.02", "", "[mesh] dt: is missing; expected a number > 0"),
         ('name = "demo"', 'name = "a/b"', "[mesh] name: \"a/b\" is no name; expected 1 to 64 ASCII letters"),
-        ("rho = [0.1, 0.1, 0.1]", "rho = [0.1]", "[model]: rho must have 3 entries, one per process noise"),
-        ("rho = [0.1, 0.1, 0.1]", "rho = [0.1, -0.1, 0.1]", "[model]: rho must be finite and not negative"),
+        ("rho = [0.1, 0.1, 0.1]", "rho = [0.1]", "[model] rho: must have 3 entries, one per process noise"),
+        ("rho = [0.1, 0.1, 0.1]", "rho = [0.1, -0.1, 0.1]", "[model] rho: must be finite and not negative"),
         ("[0.5, 0.1, 0.0]", "[0.5, 0.1]", "[model] A: expected a matrix: a list of rows of one length"),
-        ("upper = [5.0, 5.0, 5.0]", "upper = [-9.0, 5.0, 5.0]", "[model.prior]: "),
+        ("upper = [5.0, 5.0, 5.0]", "upper = [-9.0, 5.0, 5.0]", "[model.prior] lower: must not exceed upper"),
         ("C = [[1.0, 0.0, 0.5]]", "C = [[1.0, 0.0]]", "[sensors.s1] C: expected 3 columns, one per state, found 2"),
         ("r = [0.3]", "r = [-0.3]", "[sensors.s1] r: half-widths must not be negative"),
         ('kind = "LSUO"', 'kind = "LSUO"\nmeat = true', '[filters.box] meat: unknown key; did you mean "meet"?'),
         ('kind = "LSUO"', 'kind = "LSUO"\ndeadline = "5 parsecs"', "[filters.box] deadline: expected a duration"),
-        ('kind = "LSUP"', 'kind = "LSUP"\ntime_update = "edge"', "[filters.para]: "),
-        ("max_generators = 20", "max_generators = 1", "[filters.cz]: max_generators must be at least 3"),
+        ('kind = "LSUP"', 'kind = "LSUP"\ntime_update = "edge"', '[filters.para] time_update: "edge" is no choice;'),
+        ("max_generators = 20", "max_generators = 1", "[filters.cz] max_generators: must be at least 3"),
         ('"para", "cz"]', '"para", "zc"]', '[fusion.main] sources: "zc" is not defined; did you mean "cz"?'),
         ('"para", "cz"]', '"para", "cz"]\nfaults = 1', '[fusion.main] faults: is 1, but policy = "intersect" trusts'),
-        ("[filters.box]", "[filters.s1]", 'two peers are called "s1"'),
+        ("[filters.box]", "[filters.s1]", '[filters.s1]: two peers are called "s1", here and in [sensors.s1]'),
         ("[fusion.main]", "[fusion.main]\nsource = []", '[fusion.main] source: unknown key; did you mean "sources"?'),
         ("x1 = [1.0, 0.5, -0.5]", "x1 = [1.0]", "[plant] x1: expected 3 numbers, one per state, found 1"),
         ("[recorder]", '[network]\nentry = "localhost"\n[recorder]', '[network] entry: "localhost" is no endpoint'),
@@ -103,7 +109,7 @@ def test_a_mistake_is_told_with_place_value_and_remedy(problems: Problems, old: 
 def test_a_file_that_is_no_toml_names_the_line(tmp_path: Path) -> None:
     file = tmp_path / "broken.toml"
     file.write_text("[mesh]\nname = demo\n")
-    with pytest.raises(ConfigurationError, match=r"broken\.toml: not a TOML file: .*line 2"):
+    with pytest.raises(ConfigurationError, match=r"broken\.toml: line 2: not a TOML file: .*at line 2, column 8"):
         load(file)
 
 
@@ -118,7 +124,7 @@ def with_file(tmp_path: Path, demo: Path, csv: str, keys: str) -> list[str]:
     (tmp_path / "mesh.toml").write_text(text)
     with pytest.raises(ConfigurationError) as caught:
         load(tmp_path / "mesh.toml")
-    return [line.removeprefix(f"{tmp_path}/") for line in caught.value.problems]
+    return [without_line(line.removeprefix(f"{tmp_path}/")) for line in caught.value.problems]
 
 
 def test_text_in_a_number_column_is_told_with_line_and_column(tmp_path: Path, demo: Path) -> None:
@@ -166,8 +172,8 @@ def test_an_override_that_is_none_is_said(demo: Path) -> None:
 def test_a_shared_sensor_in_a_relaxed_fusion_is_warned_of(demo: Path) -> None:
     configuration = load(demo, ['fusion.main.policy="relaxed"', "fusion.main.faults=1"])
     first, second = configuration.warnings
-    assert "sensor 's1' feeds 2 sources (box, para)" in first
-    assert "sensor 's2' feeds 2 sources (box, cz)" in second
+    assert "sensor 's1' feeds 2 sources (box, para)" in str(first)
+    assert "sensor 's2' feeds 2 sources (box, cz)" in str(second)
 
 
 def test_the_digest_sees_the_model_and_the_rows_but_not_the_bounds(demo: Path) -> None:

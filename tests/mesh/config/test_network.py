@@ -72,6 +72,6 @@ def test_what_other_hosts_can_reach_without_a_certificate(endpoint: str, is_open
 def test_an_open_door_in_the_file_is_a_warning(demo: Path) -> None:
     assert load(demo).warnings == ()
     (warning,) = load(demo, ['network.listen=["tcp/0.0.0.0:7447"]']).warnings
-    assert "--insecure" in warning
+    assert "--insecure" in str(warning)
     assert load(demo, [TLS, 'network.listen=["tls/0.0.0.0:7447"]']).warnings == ()
     assert load(demo, ["network.entry=tcp/lab-7:7447"]).warnings == (), "most peers only connect to it"

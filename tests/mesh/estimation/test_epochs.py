@@ -126,7 +126,7 @@ def test_a_set_that_descends_from_an_abandoned_epoch_is_not_used(four: Callable[
 def test_a_relaxed_fusion_that_starts_late_believes_no_single_source(
     four: Callable[..., Any], liar: str, seed: int
 ) -> None:
-    widen = f'filters.f{liar}.on_contradiction="widen"'
+    widen = f'filters.f{liar}.on_inconsistency="widen"'
     mesh = four(lie(liar, "bias", 0.6, 20, 110), widen, DOMAIN, f"mesh.seed={seed}")
     mesh.run(0.9)
     mesh.kill("main")
@@ -269,7 +269,7 @@ def test_a_transfer_that_the_data_contradict_gives_way_to_them(four: Callable[..
 
 
 def test_a_family_chosen_among_sources_that_contradict_one_another_is_no_guarantee(four: Callable[..., Any]) -> None:
-    widen = 'filters.fc.on_contradiction="widen"'
+    widen = 'filters.fc.on_inconsistency="widen"'
     mesh = four(lie("c", "bias", 4.0, 30, 60), widen, *TRUSTING)
     mesh.run(120 * 0.02 + 0.4)
     first = min(e.step for e in mesh.events("source-rejected"))
@@ -281,7 +281,7 @@ def test_a_family_chosen_among_sources_that_contradict_one_another_is_no_guarant
 def test_a_relaxed_set_is_declared_as_long_as_no_more_sources_than_may_lie_are_learned(
     four: Callable[..., Any],
 ) -> None:
-    widen = each('on_contradiction="widen"')
+    widen = each('on_inconsistency="widen"')
     one = four(lie("c", "bias", 4.0, 30, 60), *widen)
     one.run(120 * 0.02 + 0.4)
     assert one.newest("fc")[120].guarantee == "learned"

@@ -199,7 +199,7 @@ def triangle(points: np.ndarray) -> ConstrainedZonotope:
 
 def check(folder: Path, lie: str, seed: int, steps: int) -> None:
     """Every other seed the filters widen their bounds, so that even a coarse lie goes on being told."""
-    widen = [f'filters.{name}.on_contradiction="widen"' for name in ("fa", "fb", "fc", "fd")] if seed % 2 else []
+    widen = [f'filters.{name}.on_inconsistency="widen"' for name in ("fa", "fb", "fc", "fd")] if seed % 2 else []
     story = tell(configuration(folder, *widen), lie, seed, steps)
     assert story.outside() == []
     for name in story.posteriors[1]:
@@ -237,7 +237,7 @@ def test_the_invented_sets_cut_off_the_truth_and_yet_contradict_no_single_source
 def test_a_fusion_that_trusts_everybody_loses_the_truth(tmp_path: Path, lie: str) -> None:
     """Otherwise the tests above show nothing."""
     trusting = ['fusion.main.policy="intersect"', "fusion.main.faults=0"]
-    trusting += [f'filters.{name}.on_contradiction="widen"' for name in ("fa", "fb", "fc", "fd")]
+    trusting += [f'filters.{name}.on_inconsistency="widen"' for name in ("fa", "fb", "fc", "fd")]
     assert tell(configuration(tmp_path, *trusting), lie, 2, 60).outside()
 
 
@@ -274,7 +274,7 @@ def named_by_enumeration(story: Story) -> int | None:
 
 @pytest.mark.parametrize("lie", ["bias", "drift", "random", "with each"])
 def test_the_liar_is_named_as_soon_as_a_search_over_all_subsets_names_it(tmp_path: Path, lie: str) -> None:
-    widen = [f'filters.{name}.on_contradiction="widen"' for name in ("fa", "fb", "fc", "fd")]
+    widen = [f'filters.{name}.on_inconsistency="widen"' for name in ("fa", "fb", "fc", "fd")]
     story = tell(configuration(tmp_path, *widen), lie, 4, 60, liar="fc")
     searched = named_by_enumeration(story)
     assert searched is not None
@@ -292,7 +292,7 @@ def test_a_liar_whom_everybody_agrees_with_is_not_named(tmp_path: Path) -> None:
 
 
 def test_a_liar_that_stops_is_let_back_in_and_health_names_it_meanwhile(tmp_path: Path) -> None:
-    widen = [f'filters.{name}.on_contradiction="widen"' for name in ("fa", "fb", "fc", "fd")]
+    widen = [f'filters.{name}.on_inconsistency="widen"' for name in ("fa", "fb", "fc", "fd")]
     story = tell(configuration(tmp_path, *widen), "bias", 3, 150, liar="fc")
     assert set(story.about("quarantined")) == {"fc"} == set(story.about("let-back-in"))
     into, out = ([e.step for e in story.events if e.code == code] for code in ("quarantined", "let-back-in"))

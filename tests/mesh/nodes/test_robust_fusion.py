@@ -104,13 +104,13 @@ def test_with_one_fault_allowed_the_fused_set_holds_the_truth(
 
 def test_a_liar_would_cut_off_the_truth_if_it_were_trusted(four: Callable[..., Any]) -> None:
     trusting = four(
-        lie("bias", 0.4), 'fusion.main.policy="intersect"', "fusion.main.faults=0", 'filters.fc.on_contradiction="hold"'
+        lie("bias", 0.4), 'fusion.main.policy="intersect"', "fusion.main.faults=0", 'filters.fc.on_inconsistency="hold"'
     )
     assert outside(trusting, "main"), "otherwise the tests above show nothing"
 
 
 def test_the_liar_is_named_quarantined_and_let_back_in(four: Callable[..., Any]) -> None:
-    mesh = four(lie("drift", 0.2), 'filters.fc.on_contradiction="widen"')
+    mesh = four(lie("drift", 0.2), 'filters.fc.on_inconsistency="widen"')
     named = mesh.events("source-rejected")
     assert named
     assert {e.about["source"] for e in named} == {"fc"}
@@ -142,7 +142,7 @@ def test_more_liars_than_allowed_are_said(four: Callable[..., Any]) -> None:
     faults = [
         f'sensors.{s}.faults=[{{kind="bias", from=30, to=40, size={size}}}]' for s, size in (("a", 9.0), ("b", -9.0))
     ]
-    widen = [f'filters.{f}.on_contradiction="widen"' for f in ("fa", "fb")]
+    widen = [f'filters.{f}.on_inconsistency="widen"' for f in ("fa", "fb")]
     mesh = four(*faults, *widen)
     assert mesh.events("too-many-faults") or outside(mesh, "main") == []
     assert len(mesh.newest("main")) == STEPS

@@ -133,7 +133,7 @@ def test_contradictions_resets_and_epochs(mesh_of: MakeMesh) -> None:
 def test_a_fusion_that_drops_its_own_prediction(mesh_of: MakeMesh) -> None:
     fault = 'sensors.s1.faults=[{kind="bias", from=30, to=40, size=6.0}]'
     options = [
-        'filters.box.on_contradiction="widen"',
+        'filters.box.on_inconsistency="widen"',
         'filters.box.sensors=["s1"]',
         'fusion.main.sources=["box", "para"]',
     ]

@@ -1,0 +1,181 @@
+"""``[filters.NAME]``: a filter's kind, its sensors, what it takes from others, and the options of its class."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple, get_args
+
+from lsu_mesh.errors import ModelError
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.registry import FILTERS, filter_class
+from lsu_mesh.mesh.config.expected import Expected, Unfit, choice, known_names
+from lsu_mesh.mesh.config.filter_options import FilterOptions, try_options
+from lsu_mesh.mesh.config.settings import FilterSettings, OnInconsistency, SensorSettings, TransferWay
+from lsu_mesh.mesh.config.system import System
+from lsu_mesh.mesh.config.table import REQUIRED, Table
+
+TRANSFERS: tuple[TransferWay, ...] = get_args(TransferWay)
+INCONSISTENCIES: tuple[OnInconsistency, ...] = get_args(OnInconsistency)
+ALIASES = {"on_contradiction": "on_inconsistency"}
+"""Keys by the names that they had before, which recordings and older files hold."""
+
+
+class Kind(NamedTuple):
+    """The class that ``kind`` names; ``None`` where there is none, which has been noted."""
+
+    name: str
+    cls: type[Filter] | None
+
+    @property
+    def is_guaranteed(self) -> bool:
+        """Whether the sets of such filters hold the state as long as the bounds do; of no class nothing is said."""
+        return self.cls is None or self.cls.guarantee == "declared"
+
+
+def kind_of(table: Table) -> Kind:
+    """The key ``kind``: a name of the registry, or ``module:Class``."""
+    found = table.read("kind", REQUIRED, Expected(f'{_KINDS.words}, or "module:Class"', _as_kind))
+    return found if isinstance(found, Kind) else Kind("", None)
+
+
+_KINDS = choice(tuple(FILTERS))
+
+
+def _as_kind(value: Any) -> Kind:
+    if not isinstance(value, str) or not value:
+        raise Unfit
+    try:
+        return Kind(value, filter_class(value))
+    except ModelError as error:
+        if ":" not in value:
+            _KINDS.convert(value)
+        raise Unfit(text=str(error)) from None
+
+
+def read_filter(
+    table: Table,
+    name: str,
+    kind: Kind,
+    sensors: Mapping[str, SensorSettings],
+    system: System,
+    peers: Mapping[str, Collection[str]],
+) -> FilterSettings:
+    """``[filters.NAME]``; the filter is made once, so that the class checks its own options.
+
+    ``peers`` holds the names of all ``filters`` and ``fusion`` tables.
+    """
+    chosen = read_names(table, "sensors", sensors)
+    deadline = table.duration("deadline", 0.05)
+    history = table.whole("history", 32, low=1, high=4096)
+    transfer = table.choice("transfer", TRANSFERS, "off")
+    senders = _read_senders(table, name, transfer, peers)
+    on_inconsistency = _read_inconsistency(table)
+    reset_after = table.whole("reset_after", 5, low=1)
+    adopt = _read_adopt(table, peers["identifier"], system)
+    options = _read_options(table, kind, sensors, chosen, system)
+    return FilterSettings(
+        name,
+        kind.name,
+        chosen,
+        deadline,
+        history,
+        transfer,
+        senders,
+        on_inconsistency,
+        reset_after,
+        options,
+        adopt,
+    )
+
+
+def _read_inconsistency(table: Table) -> OnInconsistency:
+    """``on_inconsistency``, or its old name."""
+    found = table.choice("on_inconsistency", INCONSISTENCIES, "reset")
+    (old,) = ALIASES
+    if old not in table.values:
+        return found
+    if "on_inconsistency" in table.values:
+        table.without(old, "is the old name of on_inconsistency, which is given too", "remove one of the two")
+    named: OnInconsistency = table.read(old, found, choice(INCONSISTENCIES), is_alias=True)
+    return named
+
+
+def _read_adopt(table: Table, identifiers: Collection[str], system: System) -> str:
+    """``adopt``: adoption starts again from the domain, so there must be one."""
+    adopt = table.text("adopt", None)
+    if adopt is None:
+        return ""
+    if adopt not in identifiers:
+        _note_unknown(table, "adopt", adopt, known_names(identifiers, "is no identifier of this file"))
+    elif system.model is not None and system.model.domain is None:
+        text = "adopting bounds starts again from the domain; give [model.domain]"
+        table.wrong("adopt", text, "a model with [model.domain]")
+    return str(adopt)
+
+
+def _note_unknown(table: Table, key: str, name: str, known: Expected[str]) -> bool:
+    """Note that a name is not known here; whether it was."""
+    try:
+        known.convert(name)
+    except Unfit as unfit:
+        table.wrong(key, unfit.text, known.words, near=unfit.nearest)
+        return False
+    return True
+
+
+def _read_senders(
+    table: Table, name: str, transfer: TransferWay, peers: Mapping[str, Collection[str]]
+) -> tuple[str, ...]:
+    """``transfer_from``: by default all other filters, or for fused boxes all fusions."""
+    known = peers["fusion"] if transfer == "fused" else [other for other in peers["filters"] if other != name]
+    given = table.texts("transfer_from", None)
+    if transfer == "off":
+        if given:
+            table.without("transfer_from", 'has no effect with transfer = "off"', "remove it or choose a transfer")
+        return ()
+    for other in given or ():
+        _note_unknown(table, "transfer_from", other, known_names(known, "cannot be transferred from"))
+    senders = tuple(sorted(set(known if given is None else given)))
+    if not senders:
+        what = "a fusion" if transfer == "fused" else "another filter with guaranteed sets"
+        text = f'"{transfer}" has nobody to come from; give {what}, or set "off"'
+        table.wrong("transfer", text, f'"off", or {what} in the file')
+    return senders
+
+
+def _read_options(
+    table: Table, kind: Kind, sensors: Mapping[str, SensorSettings], chosen: tuple[str, ...], system: System
+) -> dict[str, Any]:
+    """The options of the class, and what its constructor says of them as soon as it can be asked."""
+    if kind.cls is None:
+        return table.rest()
+    cls = kind.cls
+    own = FilterOptions(cls)
+    options = own.read(table)
+    noted = table.problems.are_in
+    has_sensors = chosen and not noted(table.path, "sensors") and not any(noted(f"sensors.{name}") for name in chosen)
+    has_boxes = not noted("model.prior") and not noted("model.domain")
+    if system.model is None or system.prior is None or not has_boxes or not has_sensors:
+        return options
+    rows = [row for name in chosen for row in sensors[name].C]
+    widths = [width for name in chosen for width in sensors[name].r]
+    model, prior = system.model.replace(C=rows, r=widths), system.prior
+    fine = {key: value for key, value in options.items() if not noted(table.path, key)}
+    missing = any(noted(table.path, name) for name in own.names if name not in table.values)
+    if not missing:
+        try_options(table, lambda chosen: cls(model, prior, **chosen), fine, own.required)  # type: ignore[call-arg]
+    return options
+
+
+def read_names(table: Table, key: str, known: Mapping[str, object]) -> tuple[str, ...]:
+    """A list of names that are defined elsewhere in the file, in their order; each once."""
+    names = table.texts(key)
+    if not isinstance(names, list):
+        return ()
+    names_known = known_names(known, "is not defined")
+    if not names:
+        table.wrong(key, "is empty; name at least one", names_known.words)
+    for name in dict.fromkeys(names):
+        if _note_unknown(table, key, name, names_known) and names.count(name) > 1:
+            table.wrong(key, f'"{name}" is named twice', "each name once")
+    return tuple(sorted({name for name in names if name in known}))
