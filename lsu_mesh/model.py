@@ -200,7 +200,7 @@ class LSUModel:
 
 
 class ContinuousModel:
-    """``ẋ = A x + B u + a + N w(t)``, ``y(t) = C x(t) + D u(t) + d + v``; w measurable, ``|w(t)| ≤ rho`` at every moment.
+    """``ẋ = A x + B u + a + N w(t)``, ``y(t) = C x(t) + D u(t) + d + v``; any measurable ``|w(t)| ≤ rho``.
 
     Made by :meth:`LSUModel.continuous`. Time is in seconds, so A is in 1/s and rho, through N, in state units per
     second: never a per-step rho, nor one divided by the step. ``domain`` holds the state at every moment.
@@ -241,7 +241,7 @@ class ContinuousModel:
     def discretised(self, h_ns: int) -> LSUModel:
         """The model of a stretch of ``h_ns`` nanoseconds (a whole number above 0), for ``predict(model=…)``.
 
-        ``A_h = e^{Ah}``, ``B_h = ∫₀ʰ e^{As} ds B``, ``a_h`` likewise, rounded to doubles with proved ``radii``; its noise
+        ``A_h = e^{Ah}``, ``B_h = ∫₀ʰ e^{As} ds B``, a_h likewise, rounded to doubles with proved ``radii``; its noise
         holds ``∫₀ʰ e^{As} N w ds`` for every measurable w: generators in ``noise_map`` (the last n are a box), whose
         share of the hull is ``noise_share``. The same object is given again for the same h.
 
