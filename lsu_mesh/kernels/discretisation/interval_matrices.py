@@ -15,22 +15,24 @@ Matrix = NDArray[np.float64]
 def product(A: Matrix, A_radius: Matrix, B: Matrix, B_radius: Matrix, C: Matrix, C_radius: Matrix) -> None:
     """``C ± C_radius ⊇ (A ± A_radius)(B ± B_radius)``; A (k, n), B (n, p); C may be neither A nor B.
 
-    An entry whose terms are all zero stays an exact zero.
+    An entry whose terms are all zero stays an exact zero, and one single term times 1 is exact.
     """
     n = A.shape[1]
     for i in range(A.shape[0]):
         for j in range(B.shape[1]):
-            middle, mass, spread, terms = 0.0, 0.0, 0.0, 0
+            middle, mass, whole, spread, terms = 0.0, 0.0, 0.0, 0.0, 0
             for s in range(n):
                 a, b = abs(A[i, s]), abs(B[s, j])
                 if (a == 0.0 and A_radius[i, s] == 0.0) or (b == 0.0 and B_radius[s, j] == 0.0):
                     continue
                 terms += 1
                 middle += A[i, s] * B[s, j]
-                mass += a * b
+                mass += 0.0 if a == 1.0 or b == 1.0 else a * b
+                whole += a * b
                 spread += a * B_radius[s, j] + A_radius[i, s] * (b + B_radius[s, j])
             C[i, j] = middle
-            C_radius[i, j] = 0.0 if terms == 0 else outward(spread + gamma(n + 1) * mass, n)
+            lost = spread + gamma(n + 1) * (mass if terms == 1 else whole)
+            C_radius[i, j] = 0.0 if lost == 0.0 else outward(lost, n)
 
 
 @inlined

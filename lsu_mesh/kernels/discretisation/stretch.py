@@ -63,7 +63,7 @@ def _noise(A: Matrix, N: Matrix, rho: Vector, h: float, work: NDArray[np.float64
     n, q = N.shape
     E, E_radius, box = np.empty((n, n)), np.empty((n, n)), np.zeros(n)
     norm, halvings, m = row_norm(A) * h, 0, 1
-    while norm <= USEFUL_NORM:
+    while norm <= USEFUL_NORM or m == 1:
         G = np.empty((n, q * (m + 1)))
         loose = slices(A, N, rho, h, m, G, box, E, E_radius, work)
         if loose <= 1.0:
