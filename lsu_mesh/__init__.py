@@ -17,13 +17,14 @@ if TYPE_CHECKING:
     from lsu_mesh.filters.lsuo import LSUO
     from lsu_mesh.filters.lsup import LSUP
     from lsu_mesh.filters.lsupb import LSUPB
-    from lsu_mesh.filters.run import FilterRun, run_filter
+    from lsu_mesh.filters.run import run_filter
+    from lsu_mesh.filters.run_record import FilterRun
     from lsu_mesh.filters.truncated_kalman import TruncatedKalman
     from lsu_mesh.filters.window.window_map import WindowMAP
     from lsu_mesh.filters.zonotopic_kalman import ZonotopicKalman
     from lsu_mesh.fusion.fuse import fuse
     from lsu_mesh.fusion.intersection import Fusion
-    from lsu_mesh.model import LSUModel
+    from lsu_mesh.model import ContinuousModel, LSUModel
     from lsu_mesh.simulation import Simulation, simulate
     from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
     from lsu_mesh.supports.intersection import Intersection
@@ -34,9 +35,10 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "ConstrainedZonotope": "lsu_mesh.supports.constrained_zonotope",
+    "ContinuousModel": "lsu_mesh.model",
     "Filter": "lsu_mesh.filters.filter",
     "FilterBank": "lsu_mesh.filters.bank",
-    "FilterRun": "lsu_mesh.filters.run",
+    "FilterRun": "lsu_mesh.filters.run_record",
     "Fusion": "lsu_mesh.fusion.intersection",
     "InconsistentData": "lsu_mesh.errors",
     "Intersection": "lsu_mesh.supports.intersection",
@@ -69,6 +71,7 @@ __all__ = [
     "LSUP",
     "LSUPB",
     "ConstrainedZonotope",
+    "ContinuousModel",
     "Filter",
     "FilterBank",
     "FilterRun",

@@ -234,6 +234,11 @@ class ContinuousModel:
         """m"""
         return self.rates.output_count
 
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array]:
+        """A (n, n), ``[B  a]``, N (n, q) and rho (q,) of the noises that are not 0, as kernels take them."""
+        return np.array(self.rates.A), self._inputs, self._N, self._rho
+
     def replace(self, **changes: object) -> ContinuousModel:
         """A copy with some arguments changed, see :meth:`LSUModel.replace`."""
         return ContinuousModel(self.rates.replace(**changes))
@@ -263,9 +268,7 @@ class ContinuousModel:
 
         rates, n, p = self.rates, self.state_count, self.input_count
         h_ns = step_key(h_ns)
-        finite, A, A_radius, B, B_radius, G, rho, share = discretise(
-            np.array(rates.A), self._inputs, self._N, self._rho, float(h_ns)
-        )
+        finite, A, A_radius, B, B_radius, G, rho, share = discretise(*self.arrays, float(h_ns))
         if not finite:
             raise ModelError(
                 f"a stretch of {h_ns} ns is too long for this model: its exponential overflows; take shorter steps"

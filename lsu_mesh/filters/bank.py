@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
-from lsu_mesh.filters.run import FilterRun
+from lsu_mesh.filters.run_record import FilterRun
 from lsu_mesh.filters.validation import checked_prior, kernel_model, with_offset
 from lsu_mesh.kernels import batch_run
 from lsu_mesh.kernels.runtime.scratch import scratch
