@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         run_filter,
     )
     from lsu_mesh.fusion import Fusion, fuse
-    from lsu_mesh.model import LSUModel
+    from lsu_mesh.model import ContinuousModel, LSUModel
     from lsu_mesh.simulation import Simulation, simulate
     from lsu_mesh.supports import ConstrainedZonotope, Intersection, Orthotope, Parallelotope, Support, Zonotope
 else:
@@ -42,7 +42,7 @@ else:
             ),
             "lsu_mesh.fusion": ("Fusion", "fuse"),
             "lsu_mesh.metrics": (),
-            "lsu_mesh.model": ("LSUModel",),
+            "lsu_mesh.model": ("ContinuousModel", "LSUModel"),
             "lsu_mesh.simulation": ("Simulation", "simulate"),
             "lsu_mesh.supports": (
                 "ConstrainedZonotope", "Intersection", "Orthotope", "Parallelotope", "Support", "Zonotope",
@@ -57,6 +57,7 @@ __all__ = [
     "LSUP",
     "LSUPB",
     "ConstrainedZonotope",
+    "ContinuousModel",
     "Filter",
     "FilterBank",
     "FilterRun",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import math
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels import plant_step
-from lsu_mesh.model import LSUModel
+from lsu_mesh.model import ContinuousModel, LSUModel
 
 Noise = Literal["uniform", "corners"]
 
+NOISE_SHARE = 1.0 - 1e-9
+"""Of the noise of a continuous plant: what is left covers the plant's own rounding."""
 SINE_PERIOD = 100
 """Steps in one period of the input ``"sine"``."""
 
@@ -31,6 +33,34 @@ class Simulation(NamedTuple):
     X: Matrix
     Y: Matrix
     U: Matrix
+
+
+class ContinuousSimulation(Simulation):
+    """A simulation of a continuous model: row k is of the moment ``times[k] = (k + 1) dt_ns``.
+
+    Within a step the noise is constant, so that the truth between the steps is known, too.
+    """
+
+    flow: ContinuousModel
+    dt_ns: int
+    units: Matrix
+    """Noise (T, q) of the steps in shares of rho, row k from step k + 1 on."""
+
+    @property
+    def times(self) -> list[int]:
+        """Moments (T,) of the rows, in ns."""
+        return [(k + 1) * self.dt_ns for k in range(len(self.X))]
+
+    def truth_at(self, time_ns: int) -> Vector:
+        """The state (n,) at any moment from times[0] to one step after the last."""
+        row, rest = divmod(time_ns, self.dt_ns)
+        if not 1 <= row <= len(self.X):
+            raise ModelError(f"the simulation goes from {self.dt_ns} to {(len(self.X) + 1) * self.dt_ns - 1} ns")
+        return flow_state(self.flow, self.X[row - 1], self.U[row - 1], self.units[row - 1], rest)
+
+    def input_at(self, time_ns: int) -> Vector:
+        """The input (p,) that acts from this moment on."""
+        return np.array(self.U[min(max(time_ns // self.dt_ns, 1), len(self.U)) - 1])
 
 
 def generator(seed: int, name: str, step: int) -> np.random.Generator:
@@ -80,7 +110,7 @@ def input_at(inputs: str, seed: int, step: int, size: int, name: str = "input") 
 
 
 def next_state(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vector:
-    """``x⁺ = A x + B u + N (rho · unit)``, x (n,), u (p,), ``|unit| ≤ 1`` (q,).
+    """``x⁺ = A x + B u + a + N (rho · unit)``, x (n,), u (p,), ``|unit| ≤ 1`` (q,).
 
     Without a noise map the noise is shrunk by the rounding of this very step, so that the stored x⁺ fulfils
     ``|x⁺ − A x − B u| ≤ rho`` in exact arithmetic; where rho is below the rounding, or with a noise map, x⁺ is off by
@@ -91,10 +121,62 @@ def next_state(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vec
     A = np.array(model.A)
     B = np.zeros((n, 0)) if model.B is None else np.array(model.B)
     state, drive = np.array(x, dtype=np.float64), np.array(u, dtype=np.float64).reshape(model.input_count)
+    if model.a is not None:
+        B, drive = np.hstack([B, model.a.reshape(n, 1)]), np.append(drive, 1.0)
     if model.noise_map is None:
         plant_step.bounded(A, state, B, drive, unit, np.array(model.rho), out)
     else:
         plant_step.mapped(A, state, B, drive, np.array(model.noise_map), unit, np.array(model.rho), out)
+    return out
+
+
+def flow_state(flow: ContinuousModel, x: ArrayLike, u: ArrayLike, unit: Vector, h_ns: int) -> Vector:
+    """x (n,) moved on by h_ns ≥ 0 nanoseconds under a constant input u (p,) and noise ``w = rho (1 − 1e-9) unit`` (q,).
+
+    It is ``e^{Ah} x + ∫₀ʰ e^{As} ds (B u + a + N w)`` from the middles of verified enclosures, rounded to doubles. What
+    is lost is below the radii that every filter charges for a stretch of the same model, and its own outward rounding;
+    where the noise enters, 1e-9 of it is left to cover the rest.
+    """
+    if h_ns == 0:
+        return np.array(x, dtype=np.float64)
+    driven = _noise_as_input(flow).discretised(h_ns)
+    assert driven.B is not None
+    state, out = np.array(x, dtype=np.float64), np.empty(flow.state_count)
+    drive = np.concatenate([np.array(u, dtype=np.float64).ravel(), NOISE_SHARE * flow.rates.rho * unit])
+    B = np.array(driven.B)
+    if driven.a is not None:
+        B, drive = np.hstack([B, driven.a.reshape(-1, 1)]), np.append(drive, 1.0)
+    plant_step.mapped(np.array(driven.A), state, B, drive, np.zeros((state.size, 0)), np.zeros(0), np.zeros(0), out)
+    return out
+
+
+@functools.lru_cache(maxsize=64)
+def _noise_as_input(flow: ContinuousModel) -> ContinuousModel:
+    """The model whose inputs are u and w; it has no noise."""
+    rates = flow.rates
+    N = np.eye(flow.state_count) if rates.noise_map is None else rates.noise_map
+    B = N if rates.B is None else np.hstack([rates.B, N])
+    return flow.replace(B=B, rho=np.zeros(rates.rho.size))
+
+
+def measured(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vector:
+    """``y = C x + D u + d + r · unit`` (m,), wrapped into [−period/2, period/2) where an output has a period.
+
+    Without D, d and period as :func:`measure`. Else ``|y − C x − D u − d| ≤ r`` holds exactly before the wrapping,
+    which every filter's own rounding covers.
+    """
+    if model.has_plain_outputs:
+        return measure(model.C, model.r, x, unit)
+    m = model.output_count
+    D = np.zeros((m, 0)) if model.D is None else np.array(model.D)
+    drive = np.zeros(0) if model.D is None else np.array(u, dtype=np.float64).ravel()
+    if model.d is not None:
+        D, drive = np.hstack([D, model.d.reshape(m, 1)]), np.append(drive, 1.0)
+    out = np.empty(m)
+    plant_step.bounded(np.array(model.C), np.array(x, dtype=np.float64), D, drive, unit, np.array(model.r), out)
+    if model.period is not None:
+        turns = np.floor(np.divide(out, model.period, out=np.zeros(m), where=model.period > 0) + 0.5)
+        out = out - turns * model.period
     return out
 
 
@@ -106,6 +188,7 @@ def measure(C: ArrayLike, r: ArrayLike, x: ArrayLike, unit: Vector) -> Vector:
     return out
 
 
+@overload
 def simulate(
     model: LSUModel,
     steps: int,
@@ -113,25 +196,60 @@ def simulate(
     x1: ArrayLike | None = None,
     inputs: str | ArrayLike = "normal",
     noise: Noise = "uniform",
+) -> Simulation: ...
+
+
+@overload
+def simulate(
+    model: ContinuousModel,
+    steps: int,
+    seed: int,
+    x1: ArrayLike | None = None,
+    inputs: str | ArrayLike = "normal",
+    noise: Noise = "uniform",
+    *,
+    dt_ns: int,
+) -> ContinuousSimulation: ...
+
+
+def simulate(
+    model: LSUModel | ContinuousModel,
+    steps: int,
+    seed: int,
+    x1: ArrayLike | None = None,
+    inputs: str | ArrayLike = "normal",
+    noise: Noise = "uniform",
+    *,
+    dt_ns: int | None = None,
 ) -> Simulation:
-    """Simulate ``steps`` steps from x1 (n,), 0 by default.
+    """Simulate ``steps`` steps from x1 (n,), 0 by default; of a continuous model steps of ``dt_ns`` nanoseconds.
 
     ``inputs``: see :func:`input_at`, or an array (steps, p). ``noise``: ``"uniform"``, or ``"corners"`` for the
-    extreme values only. The stored numbers fulfil the declared bounds in exact arithmetic (see :func:`next_state` for
-    the exceptions).
+    extreme values only. The stored numbers fulfil the declared bounds in exact arithmetic (see :func:`next_state` and
+    :func:`flow_state` for the exceptions).
     """
-    n, m, p, q = model.state_count, model.output_count, model.input_count, model.rho.size
+    flow = model if isinstance(model, ContinuousModel) else None
+    if (flow is None) != (dt_ns is None):
+        raise ModelError("dt_ns, the length of a step, belongs to a continuous model, and to no other")
+    rates = model.rates if isinstance(model, ContinuousModel) else model
+    n, m, p, q = rates.state_count, rates.output_count, rates.input_count, rates.rho.size
     X, Y = np.empty((steps, n)), np.empty((steps, m))
     U = _inputs(inputs, seed, steps, p)
     x = np.zeros(n) if x1 is None else np.array(x1, dtype=np.float64)
     if x.shape != (n,):
         raise ModelError(f"x1 must have {n} entries, one per state, it has shape {x.shape}")
+    units = np.empty((steps, q))
     for k in range(steps):
         step = k + 1
         X[k] = x
-        Y[k] = measure(model.C, model.r, x, unit_noise(noise, seed, "output", step=step, size=m))
-        x = next_state(model, x, U[k], unit_noise(noise, seed, "process", step=step, size=q))
-    return Simulation(X, Y, U)
+        Y[k] = measured(rates, x, U[k], unit_noise(noise, seed, "output", step=step, size=m))
+        units[k] = unit_noise(noise, seed, "process", step=step, size=q)
+        x = next_state(rates, x, U[k], units[k]) if flow is None else flow_state(flow, x, U[k], units[k], dt_ns or 0)
+    if flow is None:
+        return Simulation(X, Y, U)
+    run = ContinuousSimulation(X, Y, U)
+    run.flow, run.dt_ns, run.units = flow, dt_ns or 0, units
+    return run
 
 
 def _inputs(inputs: str | ArrayLike, seed: int, steps: int, p: int) -> Matrix:

@@ -16,6 +16,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("errors", "array_types", "lazy_exports"),
         ("kernels",),
         ("supports",),
+        ("model_arguments",),
         ("model",),
         ("systems", "simulation", "metrics"),
         ("filters", "fusion"),
@@ -24,7 +25,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh.kernels": [
         ("runtime",),
-        ("linear_programs", "parallelotopes", "zonotopes"),
+        ("linear_programs", "parallelotopes", "zonotopes", "discretisation", "plain_outputs"),
         ("filter_step", "plant_step"),
         ("batch_run",),
     ],
@@ -53,7 +54,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("intersection",),
     ],
     "lsu_mesh.filters": [
-        ("filter", "validation", "inconsistency", "transfer_gain"),
+        ("filter", "validation", "inconsistency", "transfer_gain", "plain_outputs"),
         ("compiled", "constrained_intersection", "window"),
         (REST,),
         ("registry", "run"),

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from lsu_mesh.filters.lsuo import LSUO
     from lsu_mesh.filters.lsup import LSUP
     from lsu_mesh.filters.lsupb import LSUPB
-    from lsu_mesh.filters.run import FilterRun, run_filter
+    from lsu_mesh.filters.run import run_filter
+    from lsu_mesh.filters.run_record import FilterRun
     from lsu_mesh.filters.truncated_kalman import TruncatedKalman
     from lsu_mesh.filters.window.window_map import WindowMAP
     from lsu_mesh.filters.zonotopic_kalman import ZonotopicKalman
@@ -29,7 +30,8 @@ else:
             "lsu_mesh.filters.lsuo": ("LSUO",),
             "lsu_mesh.filters.lsup": ("LSUP",),
             "lsu_mesh.filters.lsupb": ("LSUPB",),
-            "lsu_mesh.filters.run": ("FilterRun", "run_filter"),
+            "lsu_mesh.filters.run": ("run_filter",),
+            "lsu_mesh.filters.run_record": ("FilterRun",),
             "lsu_mesh.filters.truncated_kalman": ("TruncatedKalman",),
             "lsu_mesh.filters.window.window_map": ("WindowMAP",),
             "lsu_mesh.filters.zonotopic_kalman": ("ZonotopicKalman",),

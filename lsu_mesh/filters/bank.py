@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from lsu_mesh.array_types import Flags, Matrix, Stack
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
-from lsu_mesh.filters.run import FilterRun
-from lsu_mesh.filters.validation import checked_prior, kernel_model
+from lsu_mesh.filters.run_record import FilterRun
+from lsu_mesh.filters.validation import checked_prior, kernel_model, with_offset
 from lsu_mesh.kernels import batch_run
 from lsu_mesh.kernels.runtime.scratch import scratch
 from lsu_mesh.model import LSUModel
@@ -58,10 +58,12 @@ class FilterBank:
         if {len(model_list), len(prior_list)} - {1, count} or not count:
             raise ModelError(f"{len(model_list)} models and {len(prior_list)} priors do not make a bank")
         first: Any = kind(model_list[0], prior_list[0], **options)
+        _check_parts(model_list)
         if not isinstance(first, CompiledFilter) or not first.has_compiled_loop:
             raise ModelError(f"{kind.__name__} with these options has no compiled bank; make a list of filters")
         self.kind = kind
         self._filter = first
+        self._model = model_list[0]
         self._models = _stack(model_list)
         self._states = np.array([kind._enclose(checked_prior(model_list[0], prior)) for prior in prior_list])
         if len(self._states) != count:
@@ -94,7 +96,7 @@ class FilterBank:
 
     def predict(self, U: ArrayLike | None = None) -> Flags:
         """Time update with U (N, p); ``False`` marks an instance whose prediction misses its domain."""
-        p = self._models.B.shape[2]
+        p = self._model.input_count
         if U is None and p:
             raise ModelError(f"the models have {p} input(s): give U of shape ({len(self)}, {p})")
         inputs = self._no_inputs(1) if U is None else self._table("U", U, p)[:, np.newaxis]
@@ -107,7 +109,7 @@ class FilterBank:
 
         An instance with fewer rows done than T met a contradiction there; its further rows are NaN.
         """
-        m, p = self._models.C.shape[1], self._models.B.shape[2]
+        m, p = self._models.C.shape[1], self._model.input_count
         outputs = np.array(Y, dtype=np.float64)
         if outputs.ndim != 3 or outputs.shape[0] != len(self) or outputs.shape[2] != m:
             raise ModelError(f"Y must have shape ({len(self)}, steps, {m}), it has shape {outputs.shape}")
@@ -126,18 +128,19 @@ class FilterBank:
         return table
 
     def _no_inputs(self, rows: int) -> Stack:
-        return np.zeros((len(self), rows, self._models.B.shape[2]))
+        return np.zeros((len(self), rows, self._model.input_count))
 
     def _sweep(
         self, Y: Stack, U: Stack, updating: bool, last_prediction: bool
     ) -> tuple[batch_run.Record, NDArray[np.int64]]:
         record = _record(len(self), Y.shape[1] if updating else 0, self._states.shape[2], Y.shape[2])
         outcome = np.zeros((len(self), 2), dtype=np.int64)
+        inputs = with_offset(self._model, U)
 
         def share(first: int, last: int) -> None:
             batch_run.sweep(
                 self._filter.family, self._filter.option, updating, last_prediction, self._states,
-                np.empty_like(self._states[0]), self._models, Y, U, record, outcome, first, last,
+                np.empty_like(self._states[0]), self._models, Y, inputs, record, outcome, first, last,
                 scratch(self._states.shape[2], self._models.G.shape[2]),
             )  # fmt: skip
 
@@ -155,6 +158,15 @@ def _in_shares(work: Callable[[int, int], None], count: int, threads: int) -> No
         list(pool.map(work, edges[:-1], edges[1:]))
 
 
+def _check_parts(models: Sequence[LSUModel]) -> None:
+    """Raises ``ModelError`` where a model has a part for which each step must look at its set or its input."""
+    for model in models:
+        parts = {"D": model.D, "d": model.d, "period": model.period, "radii (a continuous model)": model.radii}
+        given = [name for name, part in parts.items() if part is not None]
+        if given:
+            raise ModelError(f"a bank knows no {', '.join(given)}; make a list of filters")
+
+
 def _stack(models: Sequence[LSUModel]) -> batch_run.Models:
     """Arrays of the models with a leading axis; ``ModelError`` where their shapes or their having a domain differ."""
     arrays = [kernel_model(model) for model in models]
@@ -164,7 +176,7 @@ def _stack(models: Sequence[LSUModel]) -> batch_run.Models:
     if len(shapes) > 1 or len(with_domain) not in (0, len(models)):
         raise ModelError("the models of a bank must have equal shapes, and all of them a domain or none")
     domains = np.array([box.bounds() for box in with_domain]) if with_domain else np.zeros((len(models), 0, n))
-    widths = [np.concatenate([one.rho, np.zeros(one.B.shape[1])]) for one in arrays]
+    widths = [np.concatenate([one.rho, np.zeros(one.G.shape[1] - one.rho.size)]) for one in arrays]
     return batch_run.Models(
         A=np.array([one.A for one in arrays]),
         B=np.array([one.B for one in arrays]),

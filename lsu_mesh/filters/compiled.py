@@ -13,13 +13,14 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.plain_outputs import PlainStrips, plain_strips, shifted
 from lsu_mesh.filters.validation import (
     checked_prior,
-    half_width_vector,
-    input_interval,
+    driven,
     kernel_model,
-    output_vector,
     same_states,
+    step_arrays,
+    with_offset,
 )
 from lsu_mesh.kernels import batch_run, filter_step
 from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
@@ -74,15 +75,24 @@ class CompiledFilter(Filter):
     def volume(self) -> float:
         return self._describe(self._state)[3]
 
-    def predict_output(self) -> OutputPrediction:
-        return self._predict_output(self._arrays.r)
+    def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        return shifted(self._predict_output(arrays.C, arrays.r), used, u)
 
-    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Support:
-        values = output_vector(y, self._model.output_count)
-        widths = half_width_vector("r", r, self._arrays.r)
-        state, status = self._cut(self._state, self._arrays.C, values, widths)
+    def update(
+        self,
+        y: ArrayLike,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> Support:
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        strips = plain_strips(used, arrays.C, arrays.r, y, r, u, self._image)
+        state, status = self._cut(self._state, strips.C, strips.y, strips.r)
         if status > 0:
-            raise self._contradiction(values, widths, status)
+            raise self._contradiction(strips, status)
         self._accept(state, status)
         return self.support
 
@@ -93,9 +103,8 @@ class CompiledFilter(Filter):
         model: LSUModel | None = None,
     ) -> Support:
         step_model = same_states(self._model, model)
-        arrays = self._arrays if model is None else kernel_model(step_model)
-        center, half_widths = input_interval(u, step_model.input_count)
-        widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
+        arrays = self._arrays if model is None else step_arrays(step_model)
+        center, widths = driven(step_model, arrays, u, rho, self.bounds)
         work = self._work if widths.size == self._arrays.G.shape[1] else self._scratch(widths.size)
         state = np.empty_like(self._state)
         status = filter_step.advance(
@@ -139,8 +148,8 @@ class CompiledFilter(Filter):
 
     @property
     def has_compiled_loop(self) -> bool:
-        """Whether :meth:`sweep` does what the steps one by one would do."""
-        return True
+        """Whether :meth:`sweep` does what the steps one by one do: not where a step must look at its set."""
+        return self._model.has_plain_outputs and self._model.radii is None
 
     def sweep(self, Y: Matrix, U: Matrix, record: batch_run.Record) -> tuple[int, int]:
         """Update and predict for all rows of Y (T, m), U (T, p) in a compiled loop; ``record`` has a leading axis 1.
@@ -155,14 +164,14 @@ class CompiledFilter(Filter):
             B=a.B[np.newaxis],
             C=a.C[np.newaxis],
             G=a.G[np.newaxis],
-            widths=np.concatenate([a.rho, np.zeros(a.B.shape[1])])[np.newaxis],
+            widths=np.concatenate([a.rho, np.zeros(a.G.shape[1] - a.rho.size)])[np.newaxis],
             r=a.r[np.newaxis],
             domains=np.zeros((1, 0, len(a.A))) if domain is None else np.array([domain.bounds()]),
         )
         states, outcome = self._state[np.newaxis].copy(), np.zeros((1, 2), dtype=np.int64)
         batch_run.sweep(
             self.family, self.option, True, False, states, np.empty_like(self._state), models,
-            Y[np.newaxis], U[np.newaxis], record, outcome, 0, 1, self._work,
+            Y[np.newaxis], with_offset(self._model, U)[np.newaxis], record, outcome, 0, 1, self._work,
         )  # fmt: skip
         self._state = states[0]
         return int(outcome[0, 0]), int(outcome[0, 1])
@@ -197,21 +206,27 @@ class CompiledFilter(Filter):
     def _log_volume(self, state: Matrix) -> float:
         return filter_step.log_volume(self.family, state, self._work)
 
-    def _predict_output(self, r: Vector) -> OutputPrediction:
+    def _predict_output(self, C: Matrix, r: Vector) -> OutputPrediction:
         lower, upper, point = np.empty(r.size), np.empty(r.size), np.empty(r.size)
-        filter_step.predict_output(self.family, self._state, self._arrays.C, r, lower, upper, point, self._work)
+        filter_step.predict_output(self.family, self._state, C, r, lower, upper, point, self._work)
         return OutputPrediction(lower, upper, point)
+
+    def _image(self, C: Matrix) -> tuple[Vector, Vector]:
+        """Bounds of ``C x``."""
+        interval = self._predict_output(C, np.zeros(len(C)))
+        return interval.lower, interval.upper
 
     def _accept(self, state: Matrix, status: int) -> None:
         if status < 0:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
         self._state = state
 
-    def _contradiction(self, y: Vector, r: Vector, status: int) -> InconsistentData:
+    def _contradiction(self, strips: PlainStrips, status: int) -> InconsistentData:
         """Names the strips up to the one that proved the contradiction."""
-        interval = self._predict_output(r)
+        C, y, r, names = strips
+        interval = self._predict_output(C, r)
         return strip_contradiction(
-            self._model.outputs[:status],
+            names[:status],
             interval.lower[:status],
             interval.upper[:status],
             y=y[:status],

@@ -25,7 +25,7 @@ class OutputPrediction(NamedTuple):
 
 
 class Filter(ABC):
-    """A recursive estimator of x_k for ``x⁺ = A x + B u + N w``, ``y = C x + v``, ``|w| ≤ rho``, ``|v| ≤ r``.
+    """A recursive estimator of x: ``x⁺ = A x + B u + a + N w``, ``y = C x + D u + d + v``, ``|w| ≤ rho``, ``|v| ≤ r``.
 
     Between steps the filter holds one set: before :meth:`update` the prior or prediction of x_k, after it the
     posterior.
@@ -51,15 +51,29 @@ class Filter(ABC):
         """Point estimate (n,) of the state now."""
 
     @abstractmethod
-    def predict_output(self) -> OutputPrediction:
-        """Interval of y_k before the data, ``C X ⊕ [−r, r]``."""
+    def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
+        """Interval of y_k before the data, ``C X ⊕ D u ⊕ d ⊕ [−r, r]``; of a periodic output a value not wrapped.
+
+        u (p,), or a box of it, is needed where D ≠ 0, else not read; the outputs are those of ``model`` where given.
+        """
 
     @abstractmethod
-    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Support:
+    def update(
+        self,
+        y: ArrayLike,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> Support:
         """Data update with y (m,); NaN is a missing output; r (m,) holds for this step only.
+
+        ``model``: its outputs (C, D, d, period, r) are those of this step only, of another sensor for example. ``u``
+        (p,): the input that acts from this moment on, or a box that holds it; needed where D ≠ 0, else not read.
 
         Raises
         ------
+        ModelError
+            D ≠ 0 and no u is given, or an argument does not fit.
         InconsistentData
             The strips are proved to miss the set; the filter keeps the state that it had.
         """

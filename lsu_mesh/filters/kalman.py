@@ -10,15 +10,9 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
+from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import hull_gain
-from lsu_mesh.filters.validation import (
-    checked_prior,
-    half_width_vector,
-    input_interval,
-    kernel_model,
-    output_vector,
-    same_states,
-)
+from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -95,21 +89,31 @@ class Kalman(Filter):
         reach = self._sigmas * np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return mean - reach, mean + reach
 
-    def predict_output(self) -> OutputPrediction:
+    def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
         """``C x̂ ± sigmas · √diag(C P C' + R)``; *not* guaranteed."""
         mean, covariance = self._held
-        C = self._arrays.C
-        variance = np.einsum("ij,jk,ik->i", C, covariance, C) + uniform_variance(self._arrays.r)
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        C = arrays.C
+        variance = np.einsum("ij,jk,ik->i", C, covariance, C) + uniform_variance(arrays.r)
         reach = self._sigmas * np.sqrt(np.maximum(variance, 0.0))
-        return OutputPrediction(C @ mean - reach, C @ mean + reach, C @ mean)
+        return shifted(OutputPrediction(C @ mean - reach, C @ mean + reach, C @ mean), used, u)
 
-    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Orthotope:
-        """Data update with y (m,), NaN where missing; it never contradicts."""
-        values = output_vector(y, self._model.output_count)
-        variances = uniform_variance(half_width_vector("r", r, self._arrays.r))
-        known = ~np.isnan(values)
+    def update(
+        self,
+        y: ArrayLike,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> Orthotope:
+        """Data update with y (m,), NaN where missing; it never contradicts, a period's nearest multiple is taken."""
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        strips = plain_strips(used, arrays.C, arrays.r, y, r, u, self._mean_output, is_strict=False)
+        known = ~np.isnan(strips.y)
         if known.any():
-            self._held = corrected(self._held, self._arrays.C[known], values[known], variances[known])
+            variances = uniform_variance(strips.r)
+            self._held = corrected(self._held, strips.C[known], strips.y[known], variances[known])
         return self.support
 
     def predict(
@@ -120,13 +124,16 @@ class Kalman(Filter):
     ) -> Orthotope:
         """Time update; an interval of inputs counts as uniform noise."""
         used = same_states(self._model, model)
-        arrays = self._arrays if model is None else kernel_model(used)
-        center, half_widths = input_interval(u, used.input_count)
-        widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
+        arrays = self._arrays if model is None else step_arrays(used)
+        center, widths = driven(used, arrays, u, rho, self.bounds)
         mean, P = self._held
         noise = (arrays.G * uniform_variance(widths)) @ arrays.G.T
         self._held = Gaussian(arrays.A @ mean + arrays.B @ center, arrays.A @ P @ arrays.A.T + noise)
         return self.support
+
+    def _mean_output(self, C: Matrix) -> tuple[Vector, Vector]:
+        """``C x̂`` as an interval of no width: of a periodic output the multiple nearest to it is taken."""
+        return C @ self._held.mean, C @ self._held.mean
 
     def condition(self, support: Support) -> float:
         """Take the box of ``support`` as a measurement of all states with uniform noise; the gain is of the boxes.

@@ -8,20 +8,14 @@ from typing import ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lsu_mesh.array_types import Vector
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import hull_gain
-from lsu_mesh.filters.validation import (
-    checked_prior,
-    half_width_vector,
-    input_interval,
-    kernel_model,
-    output_vector,
-    same_states,
-)
+from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
 from lsu_mesh.model import LSUModel
@@ -134,27 +128,34 @@ class LSUCZ(Filter):
             return self.support.volume()
         return box_volume(*self.bounds())
 
-    def predict_output(self) -> OutputPrediction:
+    def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
         """``C X ⊕ [−r, r]`` by safe linear programs, met with interval arithmetic over :meth:`bounds`."""
-        low, high = self._noiseless_output()
-        r = self._arrays.r
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        low, high = self._image(arrays.C)
+        r = arrays.r
         lower = np.where(r > 0, np.nextafter(low - r, -np.inf), low)
         upper = np.where(r > 0, np.nextafter(high + r, np.inf), high)
-        return OutputPrediction(lower, upper, self._model.C @ self.point)
+        return shifted(OutputPrediction(lower, upper, used.C @ self.point), used, u)
 
-    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> ConstrainedZonotope:
+    def update(
+        self,
+        y: ArrayLike,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> ConstrainedZonotope:
         """Data update: one generator and one constraint per strip, then reduction (P2023 (15))."""
-        values = output_vector(y, self._model.output_count)
-        widths = half_width_vector("r", r, self._arrays.r)
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        C, values, widths, names = plain_strips(used, arrays.C, arrays.r, y, r, u, self._image)
         if not np.isnan(values).all():
             c, G, A, b = self._held.body
-            cut = (c, *meet_strips(c, G, A, b, self._arrays.C, values, widths))
+            cut = (c, *meet_strips(c, G, A, b, C, values, widths))
             try:
                 self._hold(self._settled(cut, self._held.lower, self._held.upper))
             except InconsistentData as contradiction:
-                raise strip_contradiction(
-                    self._model.outputs, *self._noiseless_output(), values, widths
-                ) from contradiction
+                raise strip_contradiction(names, *self._image(C), values, widths) from contradiction
         return self.support
 
     def predict(
@@ -165,9 +166,8 @@ class LSUCZ(Filter):
     ) -> ConstrainedZonotope:
         """Time update ``A X ⊕ B u ⊕ N box(rho)`` (P2023 (16)), met with ``model.domain`` where it exceeds it."""
         used = same_states(self._model, model)
-        arrays = self._arrays if model is None else kernel_model(used)
-        center, half_widths = input_interval(u, used.input_count)
-        widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
+        arrays = self._arrays if model is None else step_arrays(used)
+        center, widths = driven(used, arrays, u, rho, self.bounds)
         body, (lower, upper) = self._held.body, self.bounds()
         if not self._limits.allow(body):
             body, lower, upper, _ = self._settled(body, lower, upper)
@@ -259,9 +259,10 @@ class LSUCZ(Filter):
         limit = self._limits.generators
         return None if limit is None else 3 * max(limit, self._model.state_count)
 
-    def _noiseless_output(self) -> tuple[Vector, Vector]:
-        low, high = self.support.ranges(self._arrays.C)
-        box_low, box_high = image_of_box(self._arrays.C, *self.bounds())
+    def _image(self, C: Matrix) -> tuple[Vector, Vector]:
+        """Bounds of ``C x``."""
+        low, high = self.support.ranges(C)
+        box_low, box_high = image_of_box(C, *self.bounds())
         return np.maximum(low, box_low), np.minimum(high, box_high)
 
 

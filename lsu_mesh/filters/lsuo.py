@@ -56,7 +56,7 @@ class LSUO(CompiledFilter):
 
     @property
     def has_compiled_loop(self) -> bool:
-        return self.hull == "strips"
+        return self.hull == "strips" and super().has_compiled_loop
 
     @staticmethod
     def _enclose(support: Support) -> Matrix:

@@ -2,39 +2,57 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lsu_mesh.array_types import Matrix, Vector
-from lsu_mesh.errors import InconsistentData, LsuMeshError, ModelError, UnboundedSupport
+from lsu_mesh.array_types import Matrix
+from lsu_mesh.errors import LsuMeshError, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.grid import OffGrid
+from lsu_mesh.filters.run_record import FilterRun, blank_run, named_row, store_output, store_set
+from lsu_mesh.filters.timed_run import Models, Rows, run_rows
 from lsu_mesh.kernels import batch_run
+from lsu_mesh.model import ContinuousModel, LSUModel
 
 
-class FilterRun(NamedTuple):
-    """What a filter said at each of T steps; row k is step k + 1.
-
-    points, lower, upper (T, n): point estimate and interval hull of the posterior; volumes (T,): ``filter.volume()``;
-    y_lower, y_upper, y_points (T, m): output prediction before the data.
-    """
-
-    points: Matrix
-    lower: Matrix
-    upper: Matrix
-    volumes: Vector
-    y_lower: Matrix
-    y_upper: Matrix
-    y_points: Matrix
-
-
-def run_filter(filter: Filter, Y: ArrayLike, U: ArrayLike | None = None) -> FilterRun:
+def run_filter(
+    filter: Filter,
+    Y: ArrayLike,
+    U: ArrayLike | None = None,
+    *,
+    times: ArrayLike | None = None,
+    models: Models | None = None,
+    time_errors: int | Sequence[int] = 0,
+    dt_ns: int | None = None,
+    rate: ArrayLike | None = None,
+    off_grid: OffGrid = "refuse",
+) -> FilterRun:
     """Update with ``Y[k]`` and predict with ``U[k]`` for every row; afterwards the filter holds the last posterior.
 
-    Y is (T, m), NaN for a missing output; U is (T, p), its last row is not used (T − 1 rows are enough), ``None`` for a
-    model without inputs. LSUO, LSUP and LSUPB run in one compiled loop, with the same bits as step by step.
+    Parameters
+    ----------
+    filter:
+        Holds the prior of the first row's state.
+    Y, U:
+        (T, m), NaN for a missing output; (T, p), ``None`` for a model without inputs. The last row of U is not used
+        (T − 1 rows are enough) unless D ≠ 0. LSUO, LSUP and LSUPB run plain models in one compiled loop, with the same
+        bits as step by step.
+    times:
+        Times (T,) of the rows in whole nanoseconds, or ``datetime64``, not decreasing. The filter's model (or every
+        model of ``models``) is one of a continuous model, and the set is carried over the true lengths: row k of the
+        result is the set of x(times[k]). ``U[k]`` acts from times[k] on. With a discrete model ``dt_ns`` is needed.
+    models:
+        Models of one row each, T of them (T − 1 are enough): row k's outputs are theirs, and its dynamics drive it on.
+    time_errors:
+        What is not known of the times, in ns, one for all or one per row; each strip is widened by what it costs. What
+        acts before times[0] is then taken to be ``U[0]``.
+    dt_ns, rate, off_grid:
+        Of a discrete model with times: the grid ``times[0] + k dt_ns``. A row off the grid is refused, unless ``rate``
+        (m,), the bound of the noise-free |dy/dt| per second, widens it, or ``off_grid="nearest"``, by which the sets
+        are no longer guaranteed. Row k of the result is then the set of its step.
 
     Raises
     ------
@@ -42,30 +60,32 @@ def run_filter(filter: Filter, Y: ArrayLike, U: ArrayLike | None = None) -> Filt
         Names the row; the filter is then left as it was before that step (row k's prediction, or where the prediction
         from row k misses the domain, row k's posterior).
     ModelError
-        Y or U have a wrong shape or infinite entries.
+        Y, U, times or models have a wrong shape or entries, or a row is off the grid.
     """
     outputs = _table("Y", Y, filter.model.output_count)
     if np.isinf(outputs).any():
         raise ModelError("Y must be finite or NaN (missing)")
-    inputs = _inputs(U, len(outputs), filter.model.input_count)
-    n, m, rows = filter.model.state_count, filter.model.output_count, len(outputs)
-    run = FilterRun(
-        points=np.empty((rows, n)), lower=np.empty((rows, n)), upper=np.empty((rows, n)), volumes=np.empty(rows),
-        y_lower=np.empty((rows, m)), y_upper=np.empty((rows, m)), y_points=np.empty((rows, m)),
-    )  # fmt: skip
+    all_models: list[LSUModel | ContinuousModel] = [filter.model] if models is None else list(models)
+    needs_last = any((m.rates if isinstance(m, ContinuousModel) else m).D is not None for m in all_models)
+    inputs = _inputs(U, len(outputs), filter.model.input_count, needs_last)
+    run = blank_run(len(outputs), filter.model.state_count, filter.model.output_count, filter.guarantee)
+    if times is not None or models is not None:
+        rows = Rows(outputs, inputs, times, models, time_errors, dt_ns, rate, off_grid)
+        return run_rows(filter, rows, run)
+    if np.any(time_errors) or dt_ns is not None or rate is not None:
+        raise ModelError("time_errors, dt_ns and rate need times")
     if isinstance(filter, CompiledFilter) and filter.has_compiled_loop:
         row, where = filter.sweep(outputs, inputs, batch_run.Record(*(table[np.newaxis] for table in run)))
         if where == batch_run.IN_UPDATE:
-            _update(filter, outputs, row)
+            _update(filter, outputs, inputs, row)
         elif where == batch_run.IN_PREDICT:
             _predict(filter, inputs, row - 1)
         return run
-    for k in range(rows):
-        run.y_lower[k], run.y_upper[k], run.y_points[k] = filter.predict_output()
-        _update(filter, outputs, k)
-        run.points[k], run.volumes[k] = filter.point, filter.volume()
-        run.lower[k], run.upper[k] = filter.bounds()
-        if k + 1 < rows:
+    for k in range(len(outputs)):
+        store_output(run, k, filter.predict_output(inputs[k]))
+        _update(filter, outputs, inputs, k)
+        store_set(run, k, filter)
+        if k + 1 < len(outputs):
             _predict(filter, inputs, k)
     return run
 
@@ -79,39 +99,31 @@ def _table(name: str, value: ArrayLike, columns: int) -> Matrix:
     return np.ascontiguousarray(table)
 
 
-def _inputs(U: ArrayLike | None, rows: int, columns: int) -> Matrix:
+def _inputs(U: ArrayLike | None, rows: int, columns: int, needs_last: bool) -> Matrix:
     """U (rows, p); a last row that is not given is 0, as it is not used."""
     if U is None:
-        if columns and rows > 1:
+        if columns and (rows > 1 or needs_last):
             raise ModelError(f"the model has {columns} input(s): give U of shape ({rows}, {columns})")
         return np.zeros((rows, columns))
     table = _table("U", U, columns)
-    if len(table) == rows - 1:
+    if len(table) == rows - 1 and not needs_last:
         table = np.vstack([table, np.zeros((1, columns))])
     if len(table) != rows:
         raise ModelError(f"U must have {rows} rows, one per row of Y, it has {len(table)}")
-    if not np.isfinite(table[: rows - 1]).all():
+    if not np.isfinite(table[: rows if needs_last else rows - 1]).all():
         raise ModelError("U must hold finite numbers only")
     return table
 
 
-def _update(filter: Filter, Y: Matrix, row: int) -> None:
+def _update(filter: Filter, Y: Matrix, U: Matrix, row: int) -> None:
     try:
-        filter.update(Y[row])
+        filter.update(Y[row], u=U[row])
     except LsuMeshError as error:
-        raise _at(row, error) from error
+        raise named_row(row, error) from error
 
 
 def _predict(filter: Filter, U: Matrix, row: int) -> None:
     try:
         filter.predict(U[row] if U.shape[1] else None)
     except LsuMeshError as error:
-        raise _at(row, error) from error
-
-
-def _at(row: int, error: LsuMeshError) -> LsuMeshError:
-    """The same error, with the row in front."""
-    message = f"row {row} (step {row + 1}): {error}"
-    if isinstance(error, InconsistentData):
-        return InconsistentData(message, error.rows, error.gap)
-    return UnboundedSupport(message) if isinstance(error, UnboundedSupport) else type(error)(message)
+        raise named_row(row, error) from error

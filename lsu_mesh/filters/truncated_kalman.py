@@ -61,11 +61,17 @@ class TruncatedKalman(Kalman):
         with the domain once more."""
         return np.clip(self._held.mean, self._lower, self._upper)
 
-    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Orthotope:
+    def update(
+        self,
+        y: ArrayLike,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> Orthotope:
         """Data update with y (m,), NaN where missing, then the truncation."""
         if not self._feedback:
             self._held = self._full
-        super().update(y, r)
+        super().update(y, r, model, u)
         self._full = self._held
         self._held = truncated(self._held, self._lower, self._upper)
         return self.support

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
+from lsu_mesh.kernels.discretisation.step_charges import charge
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -17,7 +20,8 @@ from lsu_mesh.supports.support import Support
 class KernelModel(NamedTuple):
     """A model as kernels take it: writable, contiguous, no ``None``.
 
-    A (n, n), B (n, p), C (m, n), ``G = [N  B]`` (n, q + p) with the columns of everything unknown, rho (q,), r (m,).
+    A (n, n), ``B = [B  a]`` (n, p + 1), or (n, p) without offset, C (m, n), ``G = [N  B]`` (n, q + p) with the columns
+    of everything unknown, rho (q,), r (m,). With radii the last n columns of N are the identity.
     """
 
     A: Matrix
@@ -33,14 +37,59 @@ def kernel_model(model: LSUModel) -> KernelModel:
     n = model.state_count
     B = np.zeros((n, 0)) if model.B is None else model.B
     N = np.eye(n) if model.noise_map is None else model.noise_map
+    rho = np.array(model.rho)
+    if model.radii is not None and not np.array_equal(N[:, -n:], np.eye(n)):
+        N, rho = np.hstack([N, np.eye(n)]), np.concatenate([rho, np.zeros(n)])
     return KernelModel(
         A=np.array(model.A),
-        B=np.array(B),
+        B=np.array(B) if model.a is None else np.hstack([B, model.a.reshape(n, 1)]),
         C=np.array(model.C),
         G=np.ascontiguousarray(np.hstack([N, B])),
-        rho=np.array(model.rho),
+        rho=rho,
         r=np.array(model.r),
     )
+
+
+@functools.lru_cache(maxsize=64)
+def step_arrays(model: LSUModel) -> KernelModel:
+    """:func:`kernel_model` of a model of one step, kept for the next step of the same length."""
+    return kernel_model(model)
+
+
+class Driven(NamedTuple):
+    """What drives a time update: u (p,), or (p + 1,) with the 1 of an offset; the widths (q + p,) of G's columns."""
+
+    u: Vector
+    widths: Vector
+
+
+def driven(
+    model: LSUModel,
+    arrays: KernelModel,
+    u: ArrayLike | Orthotope | None,
+    rho: ArrayLike | None,
+    bounds: Callable[[], tuple[Vector, Vector]],
+) -> Driven:
+    """The input and the half-widths of all that is unknown in a step from a set with these bounds.
+
+    Where the model has radii, what they charge, ``radii.A |x| + radii.B |u| + radii.a``, is among them.
+    """
+    center, half_widths = input_interval(u, model.input_count)
+    given = half_width_vector("rho", rho, arrays.rho[: model.rho.size])
+    if given.size < arrays.rho.size:
+        given = np.concatenate([given, np.zeros(arrays.rho.size - given.size)])
+    widths = np.concatenate([given, half_widths])
+    if model.radii is not None:
+        lower, upper = bounds()
+        first = arrays.rho.size - lower.size
+        A, B, a = (np.array(radius) for radius in model.radii)
+        charge(A, B, a, np.array(lower), np.array(upper), center, half_widths, widths, first)
+    return Driven(center if model.a is None else np.append(center, 1.0), widths)
+
+
+def with_offset(model: LSUModel, U: Matrix) -> Matrix:
+    """Inputs (…, p) as kernels take them, with a last column of ones where the model has an offset."""
+    return U if model.a is None else np.concatenate([U, np.ones((*U.shape[:-1], 1))], axis=-1)
 
 
 def output_vector(y: ArrayLike, size: int) -> Vector:

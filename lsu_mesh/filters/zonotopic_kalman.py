@@ -11,15 +11,9 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import hull_gain
-from lsu_mesh.filters.validation import (
-    checked_prior,
-    half_width_vector,
-    input_interval,
-    kernel_model,
-    output_vector,
-    same_states,
-)
+from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
 from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
@@ -113,25 +107,35 @@ class ZonotopicKalman(Filter):
         lower, upper = self.support.bounds()
         return np.maximum(lower, self._held.lower), np.minimum(upper, self._held.upper)
 
-    def predict_output(self) -> OutputPrediction:
+    def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
         """``C c ± (Σ_j |C H_j| + r)``, met with the image of :meth:`bounds`."""
-        low, high = self._noiseless_output()
-        r = self._arrays.r
-        return OutputPrediction(
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        low, high = self._image(arrays.C)
+        r = arrays.r
+        interval = OutputPrediction(
             np.where(r > 0, np.nextafter(low - r, -np.inf), low),
             np.where(r > 0, np.nextafter(high + r, np.inf), high),
-            self._model.C @ self.point,
+            used.C @ self.point,
         )
+        return shifted(interval, used, u)
 
-    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Zonotope:
+    def update(
+        self,
+        y: ArrayLike,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> Zonotope:
         """Data update with the optimal gain; in the predictor form the data wait for :meth:`predict`."""
-        values = output_vector(y, self._model.output_count)
-        widths = half_width_vector("r", r, self._arrays.r)
+        used = same_states(self._model, model)
+        arrays = self._arrays if model is None else step_arrays(used)
+        C, values, widths, names = plain_strips(used, arrays.C, arrays.r, y, r, u, self._image)
         known = ~np.isnan(values)
         if known.any():
-            strips = Strips(np.array(self._arrays.C[known]), values[known], widths[known])
+            strips = Strips(np.array(C[known]), values[known], widths[known])
             if self._excludes(strips):
-                raise strip_contradiction(self._model.outputs, *self._noiseless_output(), values, widths)
+                raise strip_contradiction(names, *self._image(C), values, widths)
             if self._form == "filter":
                 self._held = _corrected(self._held, strips)
             else:
@@ -147,9 +151,8 @@ class ZonotopicKalman(Filter):
     ) -> Zonotope:
         """Time update ``A X ⊕ B u ⊕ N box(rho)``, reduced; :meth:`bounds` are met with ``model.domain``."""
         used = same_states(self._model, model)
-        arrays = self._arrays if model is None else kernel_model(used)
-        center, half_widths = input_interval(u, used.input_count)
-        widths = np.concatenate([half_width_vector("rho", rho, arrays.rho), half_widths])
+        arrays = self._arrays if model is None else step_arrays(used)
+        center, widths = driven(used, arrays, u, rho, self.bounds)
         held = _corrected(self._held, self._held.pending)
         body = (held.c, held.H, np.zeros((0, held.H.shape[1])), np.zeros(0))
         finite, moved, lower, upper = predict_constrained(
@@ -227,8 +230,8 @@ class ZonotopicKalman(Filter):
             raise ModelError(f"the snapshot must be one of ZonotopicKalman, it is {type(snapshot).__name__}")
         self._held = snapshot
 
-    def _noiseless_output(self) -> tuple[Vector, Vector]:
-        C = self._arrays.C
+    def _image(self, C: Matrix) -> tuple[Vector, Vector]:
+        """Bounds of ``C x``."""
         box_low, box_high = image_of_box(C, *self.bounds())
         high = np.array([self.support.support(row) for row in C])
         low = np.array([-self.support.support(-row) for row in C])

@@ -20,7 +20,8 @@ from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.filters.lsup import LSUP
 from lsu_mesh.filters.lsupb import LSUPB
-from lsu_mesh.filters.run import FilterRun, run_filter
+from lsu_mesh.filters.run import run_filter
+from lsu_mesh.filters.run_record import FilterRun
 from lsu_mesh.model import LSUModel
 from lsu_mesh.simulation import Simulation
 from lsu_mesh.supports.orthotope import Orthotope

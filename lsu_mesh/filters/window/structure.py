@@ -60,6 +60,7 @@ class Structure:
         unknown: UnknownEntries = (),
     ) -> None:
         n, m = model.state_count, model.output_count
+        check_window_model(model)
         if E is not None and model.noise_map is not None:
             raise ModelError("E and a noise map exclude each other: both say how noise enters the states")
         self.model = model
@@ -134,6 +135,16 @@ class Structure:
         for _, i, j in self.of(matrix):
             known[i, j] = 0.0
         return known
+
+
+def check_window_model(model: LSUModel) -> None:
+    """Raises ``ModelError`` where the model has a part that the window programs do not know."""
+    parts = {"D": model.D, "a": model.a, "d": model.d, "period": model.period, "radii": model.radii}
+    given = [name for name, part in parts.items() if part is not None]
+    if given:
+        raise ModelError(
+            f"the window estimators know no {', '.join(given)}: take offsets and D u off the data, or another filter"
+        )
 
 
 def unit_triangular(name: str, value: ArrayLike | None, size: int) -> Matrix:

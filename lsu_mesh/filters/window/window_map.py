@@ -15,7 +15,7 @@ from lsu_mesh.filters.validation import checked_prior, input_interval, output_ve
 from lsu_mesh.filters.window.interval_estimate import interval_estimate
 from lsu_mesh.filters.window.program import HalfWidths, Selected, WindowData, WindowProgram, WindowSolution
 from lsu_mesh.filters.window.state import Window
-from lsu_mesh.filters.window.structure import Structure, UnknownEntries
+from lsu_mesh.filters.window.structure import Structure, UnknownEntries, check_window_model
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -161,8 +161,10 @@ class WindowMAP(Filter):
         lower, upper = _met(x - reach, x + reach, data.lower[-1], data.upper[-1])
         return np.minimum(lower, x), np.maximum(upper, x)
 
-    def predict_output(self) -> OutputPrediction:
+    def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
         """``F⁻¹(C x ± r̂)`` over :meth:`bounds`; *not* guaranteed."""
+        if model is not None:
+            raise ModelError("WindowMAP cannot take the outputs of another model for a step; give it all rows of C")
         theta = self._state.data.theta
         inverse = np.linalg.inv(self._structure.at("F", theta))
         C = inverse @ self._structure.at("C", theta)
@@ -171,13 +173,21 @@ class WindowMAP(Filter):
         reach = np.abs(C) @ (0.5 * (upper - lower)) + np.abs(inverse) @ self._state.r
         return OutputPrediction(middle - reach, middle + reach, C @ self.point)
 
-    def update(self, y: ArrayLike, r: ArrayLike | None = None) -> Orthotope:
+    def update(
+        self,
+        y: ArrayLike,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> Orthotope:
         """Data update: solve the window's program with y_k (m,), NaN where missing.
 
         Raises ``InconsistentData`` where no half-widths in their ranges explain the window.
         """
         if r is not None:
             raise ModelError("WindowMAP estimates r; limits for it are the option r_range")
+        if model is not None:
+            raise ModelError("WindowMAP cannot take the outputs of another model for a step; give it all rows of C")
         state = self._state
         Y = np.array(state.data.Y)
         Y[-1] = output_vector(y, self._model.output_count)
@@ -234,6 +244,7 @@ class WindowMAP(Filter):
 
     def _step_model(self, model: LSUModel | None) -> LSUModel:
         used = same_states(self._model, model)
+        check_window_model(used)
         if model is not None and any(entry.matrix in "AB" for entry in self._structure.entries):
             raise ModelError("a model of one step and unknown entries of A or B exclude each other")
         if not _are_equal(used.noise_map, self._model.noise_map):

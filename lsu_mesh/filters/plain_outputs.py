@@ -1,0 +1,89 @@
+"""Data of outputs with feedthrough, offsets and periods as the plain strips ``|y − C x| ≤ r`` that filters cut with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.errors import ModelError
+from lsu_mesh.filters.filter import OutputPrediction
+from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.validation import half_width_vector, input_interval, output_vector
+from lsu_mesh.kernels import plain_outputs as kernels
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.orthotope import Orthotope
+
+Image = Callable[[Matrix], tuple[Vector, Vector]]
+"""Bounds (m,), (m,) of ``C x`` over a filter's set."""
+
+
+class PlainStrips(NamedTuple):
+    """``|y − C x| ≤ r``: C (m, n), y (m,) with NaN for no strip, r (m,), and the names of the outputs."""
+
+    C: Matrix
+    y: Vector
+    r: Vector
+    names: tuple[str, ...]
+
+
+def plain_strips(
+    model: LSUModel,
+    C: Matrix,
+    default_r: Vector,
+    y: ArrayLike,
+    r: ArrayLike | None,
+    u: ArrayLike | Orthotope | None,
+    image: Image,
+    is_strict: bool = True,
+) -> PlainStrips:
+    """The strips of y (m,): ``y − d − D u`` with its rounding in r, and the multiples of the periods that can be.
+
+    C (m, n), default_r (m,) are the model's. A plain model gives y and r back, bit by bit.
+
+    Raises
+    ------
+    InconsistentData
+        An output with a period is proved to miss the set for every multiple; only where ``is_strict``, else the
+        nearest is taken.
+    """
+    values = output_vector(y, model.output_count)
+    widths = half_width_vector("r", r, default_r)
+    if model.has_plain_outputs:
+        return PlainStrips(C, values, widths, model.outputs)
+    shift, spread = _shift(model, u)
+    period = np.zeros(values.size) if model.period is None else np.array(model.period)
+    low, high = image(C) if period.any() else (np.zeros(values.size), np.zeros(values.size))
+    plain_y, plain_r = np.empty_like(values), np.empty_like(values)
+    low, high = np.array(low), np.array(high)
+    missed = kernels.plain_strips(values, widths, shift, spread, period, low, high, plain_y, plain_r)
+    if missed and is_strict:
+        raise strip_contradiction(model.outputs, low, high, np.where(period > 0, plain_y, np.nan), plain_r)
+    return PlainStrips(C, plain_y, plain_r, model.outputs)
+
+
+def shifted(prediction: OutputPrediction, model: LSUModel, u: ArrayLike | Orthotope | None) -> OutputPrediction:
+    """An interval of ``C x + v`` as one of ``y = C x + D u + d + v``."""
+    if model.D is None and model.d is None:
+        return prediction
+    kernels.shifted_interval(*prediction, *_shift(model, u))
+    return prediction
+
+
+def _shift(model: LSUModel, u: ArrayLike | Orthotope | None) -> tuple[Vector, Vector]:
+    """``D u + d`` (m,) and what is not known of it."""
+    m = model.output_count
+    d = np.zeros(m) if model.d is None else np.array(model.d)
+    shift, spread = np.empty(m), np.empty(m)
+    if model.D is None:
+        D, center, half_widths = np.zeros((m, 0)), np.zeros(0), np.zeros(0)
+    elif u is None:
+        raise ModelError("D ≠ 0: an output depends on the input; give u, or an Orthotope that holds it")
+    else:
+        D = np.array(model.D)
+        center, half_widths = input_interval(u, model.input_count)
+    kernels.output_shift(D, d, center, half_widths, shift, spread)
+    return shift, spread
