@@ -180,7 +180,7 @@ def duration(low: float = 0.0) -> Expected[float]:
     def convert(value: Any) -> float:
         match = _DURATION.fullmatch(value) if isinstance(value, str) else None
         if match is None:
-            raise Unfit('give it with a unit: us, ms, s or min, such as "50ms"' if is_number(value) else "")
+            raise Unfit(f'write "{value}s" if seconds are meant' if is_number(value) else "")
         seconds = float(match[1]) * _UNIT_SECONDS[match[2]]
         if not low <= seconds < math.inf:
             raise Unfit
@@ -194,8 +194,8 @@ def each(words: str, of: Expected[T]) -> Expected[list[T]]:
     return Expected(words, lambda value: as_list(value, of))
 
 
-def known_names(known: Iterable[str], what: str) -> Expected[str]:
-    """A name that is defined elsewhere in the file."""
+def known_names(known: Iterable[str], sentence: str) -> Expected[str]:
+    """A name that is defined elsewhere in the file; ``sentence`` says of ``{name}`` that it is not."""
     names = sorted(known)
 
     def convert(value: Any) -> str:
@@ -203,7 +203,7 @@ def known_names(known: Iterable[str], what: str) -> Expected[str]:
             return value
         if not isinstance(value, str):
             raise Unfit
-        text = f"{shown(value)} {what}; {nearest(value, names)}"
+        text = f"{sentence.format(name=shown(value))}; {nearest(value, names)}"
         raise Unfit(text=text, nearest=closest(value, names))
 
     listed = ", ".join(map(shown, names))

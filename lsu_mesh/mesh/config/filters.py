@@ -106,7 +106,7 @@ def _read_adopt(table: Table, identifiers: Collection[str], system: System) -> s
     if adopt is None:
         return ""
     if adopt not in identifiers:
-        _note_unknown(table, "adopt", adopt, known_names(identifiers, "is no identifier of this file"))
+        _note_unknown(table, "adopt", adopt, known_names(identifiers, "there is no identifier {name}"))
     elif system.model is not None and system.model.domain is None:
         text = "adopting bounds starts again from the domain; give [model.domain]"
         table.wrong("adopt", text, "a model with [model.domain]")
@@ -134,7 +134,7 @@ def _read_senders(
             table.without("transfer_from", 'has no effect with transfer = "off"', "remove it or choose a transfer")
         return ()
     for other in given or ():
-        _note_unknown(table, "transfer_from", other, known_names(known, "cannot be transferred from"))
+        _note_unknown(table, "transfer_from", other, known_names(known, "{name} cannot be transferred from"))
     senders = tuple(sorted(set(known if given is None else given)))
     if not senders:
         what = "a fusion" if transfer == "fused" else "another filter with guaranteed sets"
@@ -172,7 +172,7 @@ def read_names(table: Table, key: str, known: Mapping[str, object]) -> tuple[str
     names = table.texts(key)
     if not isinstance(names, list):
         return ()
-    names_known = known_names(known, "is not defined")
+    names_known = known_names(known, "{name} is not defined")
     if not names:
         table.wrong(key, "is empty; name at least one", names_known.words)
     for name in dict.fromkeys(names):
