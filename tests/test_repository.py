@@ -65,9 +65,16 @@ PLACES = ("", "lsu_mesh", "services/lsu_mesh_services")
 _PATH = re.compile(r"`((?:[\w.-]+/)+(?:[\w.-]+\.(?:py|toml|md|yaml|sh))?)`")
 
 
-def test_every_path_that_a_page_names_exists(root: Path) -> None:
+def test_every_path_that_a_page_or_a_docstring_names_exists(root: Path) -> None:
     pages = [root / "README.md", root / "CONTRIBUTING.md", *sorted((root / "docs").rglob("*.md"))]
+    files = [path for folder in ("lsu_mesh", "services") for path in sorted((root / folder).rglob("*.py"))]
     named = {(page.name, path) for page in pages for path in _PATH.findall(page.read_text(encoding="utf-8"))}
+    named |= {
+        (file.name, path)
+        for file in files
+        for path in _PATH.findall(file.read_text(encoding="utf-8"))
+        if path.endswith(".py")
+    }
     assert ("architecture.md", "kernels/parallelotopes/strip_update.py") in named
     assert [path for path in sorted(named) if not any((root / place / path[1]).exists() for place in PLACES)] == []
 

@@ -15,7 +15,7 @@ from lsu_mesh.kernels import batch_run
 
 
 class FilterRun(NamedTuple):
-    """What a filter said at each of T steps; row k is step k + 1.
+    """The results of a filter at each of T steps; row k is step k + 1.
 
     points, lower, upper (T, n): point estimate and interval hull of the posterior; volumes (T,): ``filter.volume()``;
     y_lower, y_upper, y_points (T, m): output prediction before the data.
