@@ -24,7 +24,7 @@ PARTNERS = {"plant": "s2", "sensor": "cz", "filter": "main", "fusion": "recorder
 ALL = "all at once"
 LEASE_S = 2.0
 SETTLE_S = 15.0
-"""GapRecovery of missed messages may take so long on a loaded machine."""
+"""Recovery of missed messages may take so long on a loaded machine."""
 
 
 @dataclass(frozen=True)

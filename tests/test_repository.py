@@ -49,7 +49,7 @@ def test_every_make_command_that_the_readme_names_exists(root: Path) -> None:
 
 def test_every_link_of_the_pages_leads_somewhere(root: Path) -> None:
     pages = [*(root / "docs").rglob("*.md"), *(root / "examples").rglob("*.md")]
-    for page in [root / "README.md", root / "CHANGELOG.md", *sorted(pages)]:
+    for page in [root / "README.md", root / "CHANGELOG.md", root / "CONTRIBUTING.md", *sorted(pages)]:
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
             if not target.startswith("http"):
                 assert (page.parent / target).exists(), f"{page.name}: {target}"
@@ -58,6 +58,25 @@ def test_every_link_of_the_pages_leads_somewhere(root: Path) -> None:
 MAX_LINES = 400
 MAY_BE_LONGER = {"lsu_mesh/mesh/messages.py"}
 """All messages of the protocol stand side by side."""
+
+
+PLACES = ("", "lsu_mesh", "services/lsu_mesh_services")
+"""Where the paths of the pages begin."""
+_PATH = re.compile(r"`((?:[\w.-]+/)+(?:[\w.-]+\.(?:py|toml|md|yaml|sh))?)`")
+
+
+def test_every_path_that_a_page_or_a_docstring_names_exists(root: Path) -> None:
+    pages = [root / "README.md", root / "CONTRIBUTING.md", *sorted((root / "docs").rglob("*.md"))]
+    files = [path for folder in ("lsu_mesh", "services") for path in sorted((root / folder).rglob("*.py"))]
+    named = {(page.name, path) for page in pages for path in _PATH.findall(page.read_text(encoding="utf-8"))}
+    named |= {
+        (file.name, path)
+        for file in files
+        for path in _PATH.findall(file.read_text(encoding="utf-8"))
+        if path.endswith(".py")
+    }
+    assert ("architecture.md", "kernels/parallelotopes/strip_update.py") in named
+    assert [path for path in sorted(named) if not any((root / place / path[1]).exists() for place in PLACES)] == []
 
 
 def test_no_python_file_grows_past_what_one_can_read(tracked: list[Path], root: Path) -> None:
@@ -91,8 +110,10 @@ def test_a_test_lies_where_the_file_lies_after_which_it_is_named(root: Path) -> 
     for base, mirror in ((root / "lsu_mesh", tests), (root / "services" / "lsu_mesh_services", tests / "services")):
         for path in base.rglob("*.py"):
             home = (mirror / path.parent.relative_to(base)).relative_to(tests)
-            name = path.parent.name if path.stem == "__init__" else path.stem
-            homes.setdefault(name, set()).add(home.as_posix())
+            if path.stem == "__init__":
+                homes.setdefault(path.parent.name, set()).update((home.as_posix(), home.parent.as_posix()))
+            else:
+                homes.setdefault(path.stem, set()).add(home.as_posix())
     misplaced = [
         f"tests/{folder}/{path.name}: expected in {sorted(homes[name])}"
         for path in sorted(tests.rglob("test_*.py"))

@@ -48,7 +48,7 @@ def stated(labels: tuple[str, ...], paper: str, here: Cell, *, holds: bool, why:
 
 
 def trend_stated(labels: tuple[str, ...], paper: str, here: Cell, *, holds: bool, why: str) -> Row:
-    """A statement in words that holds here in direction, not in size (``why`` tells the difference)."""
+    """A statement in words that holds here in direction, not in size (``why`` states the difference)."""
     return Row(labels, paper, here, _with(SAME_TREND if holds else NOT_REPRODUCED, why))
 
 

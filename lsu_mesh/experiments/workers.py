@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from typing import TypeAlias, TypeVar
 
 Watch: TypeAlias = Callable[[float], None]
-"""Is told the share of the work that is done, from 0 to 1."""
+"""Receives the share of the work that is done, from 0 to 1."""
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 _SHARED: ContextVar[ProcessPoolExecutor | None] = ContextVar("shared", default=None)

@@ -41,7 +41,7 @@ class FilterBank:
         Options of the class, as ``time_update`` of LSUP.
 
     Every instance gives the same bits as a filter of its own. An instance whose data contradict its bounds (or whose
-    set overflows) keeps the set that it had, and the others go on.
+    set overflows) keeps the set that it had, and the others continue.
     """
 
     def __init__(

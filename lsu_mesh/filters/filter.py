@@ -103,7 +103,7 @@ class Filter(ABC):
         """Start again from a set that is known to hold the state now."""
 
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
-        """Go on from what a filter of this class said: its :attr:`support` and its :meth:`bounds` (n,), (n,).
+        """Continue from what a filter of this class published: its :attr:`support` and its :meth:`bounds` (n,), (n,).
 
         The later sets are those of that filter, bit by bit, if :attr:`is_resumable`.
         """

@@ -47,7 +47,7 @@ class LSUPB(CompiledFilter):
         """Go on from the parallelotope in ``support`` and the box, bit by bit."""
         body = next((part for part in getattr(support, "parts", ()) if isinstance(part, Parallelotope)), None)
         if body is None:
-            raise ModelError(f"{self.kind} goes on from an intersection with a parallelotope, not from {support!r}")
+            raise ModelError(f"{self.kind} continues from an intersection with a parallelotope, not from {support!r}")
         self._state = np.vstack([body.center, body.generators, lower, upper])
 
     @staticmethod

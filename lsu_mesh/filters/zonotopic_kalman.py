@@ -206,7 +206,7 @@ class ZonotopicKalman(Filter):
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Go on from a zonotope and a box; in the predictor form data that wait have to be given again."""
         if not isinstance(support, Zonotope):
-            raise ModelError(f"{self.kind} goes on from a zonotope, not from {support!r}")
+            raise ModelError(f"{self.kind} continues from a zonotope, not from {support!r}")
         self._held = Held(
             c=support.center.copy(),
             H=support.generators.copy(),

@@ -1,4 +1,4 @@
-"""Whole runs of whole banks of independent filters, over the step of ``kernels/step.py``."""
+"""Whole runs of whole banks of independent filters, over the step of ``kernels/filter_step.py``."""
 
 from __future__ import annotations
 

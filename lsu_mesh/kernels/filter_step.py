@@ -2,8 +2,8 @@
 
 A state is a matrix with rows of length n: ``BOX`` lower, upper; ``PARALLELOTOPE`` c, then the n rows of T; ``BUNDLE``
 c, the n rows of T, lower, upper. ``option`` is, for ``BOX``, whether the hull is met with the prediction, and for
-``PARALLELOTOPE`` the kind of time update (``kernels/parallelotope.py``). All families and actions share one compiled
-function: each further one would compile everything below it once more.
+``PARALLELOTOPE`` the kind of time update (``kernels/parallelotopes/parallelotope.py``). All families and actions share
+one compiled function: each further one would compile everything below it once more.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ class _Run:
 class Ledger:
     """Counts per key, from the first number that came: up to ``flushed[key]`` nothing is missing but what is lost.
 
-    Numbers of another boot start a new count, which is told from the next flush on.
+    Numbers of another boot start a new count, which is published from the next flush on.
     """
 
     def __init__(self) -> None:

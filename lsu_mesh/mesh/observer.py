@@ -1,4 +1,4 @@
-"""How a whole mesh does, as somebody sees it who hears its health messages: worst wins, and silence is an answer.
+"""The level of a whole mesh, from its health messages: the worst level counts, and a silent peer is stale.
 
 A peer says OK, WARN or ERROR of itself. STALE is what others say of it: its heartbeats have stopped, or it never came.
 A heartbeat proves that a peer computes; liveliness proves only that its process is connected.
@@ -51,9 +51,9 @@ class HealthObserver:
     Parameters
     ----------
     configuration:
-        Its peers are expected; others that are heard are listed too.
+        Its peers are expected; others that publish health are listed too.
     now:
-        When the observer begins to listen; a peer gets ``STALE_NS`` from then on to be heard.
+        When the observer begins to listen; a peer without a heartbeat in the next ``STALE_NS`` is stale.
     """
 
     def __init__(self, configuration: Configuration, now: int) -> None:

@@ -96,7 +96,7 @@ class Replay:
                 node.take_candidate(start)
 
     def _until(self, end: int) -> Iterator[Timed]:
-        """Let the clock run to ``end``: whoever wakes up before acts then."""
+        """Let the clock run to ``end``; nodes that are due before act at their time."""
         while True:
             waking = [(at, i, name) for name, i in self._order.items() if (at := self.nodes[name].wakeup()) is not None]
             due = [entry for entry in waking if entry[0] < end]

@@ -31,9 +31,9 @@ LINKS_S = 10.0
 """How long to wait for the last connections when all peers are there."""
 START_LEAD_S = 0.3
 MAX_AT_ONCE = 1024
-"""Messages taken before the children, and whoever says stop, are looked at again, however many more are waiting."""
+"""Messages that are processed before the children and the stop flag are checked again, however many more wait."""
 QUIET_S = 4.0
-"""The run is over when the sources have ended and nothing new has come for so long."""
+"""The run is over when the sources have ended and no new message has arrived for so long."""
 
 
 class Player(Protocol):

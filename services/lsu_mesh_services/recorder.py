@@ -25,11 +25,11 @@ from lsu_mesh_services.stop import Stop
 
 ROLE_NAME = "recorder"
 AFTER_STOP_S = 0.5
-"""How long the recorder goes on taking what is under way after it was told to stop, at the most."""
+"""How long the recorder still receives messages, at most, after it was asked to stop."""
 QUIET_S = 0.2
-"""Then nothing is under way any more."""
+"""When no message has arrived for so long, none is under way."""
 MAX_AT_ONCE = 2048
-"""Messages recorded before the recorder looks up again: at what it is told, and at the time."""
+"""Messages that are recorded before the recorder checks the stop flag and the time again."""
 
 
 def run_recorder(

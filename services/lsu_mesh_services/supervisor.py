@@ -1,4 +1,4 @@
-"""RestartSearch, watches, restarts and stops its own children, and keeps their last words."""
+"""Starts, watches, restarts and stops its own children, and keeps the last lines that they print."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Viewer:
             )
         except OSError as error:
             self.is_told = True
-            return f"no viewer: {program}: {error.strerror}; the run goes on without it"
+            return f"no viewer: {program}: {error.strerror}; the run continues without it"
         return f"viewer: http://{LOOPBACK}:{self.web_port}/?url={address}" if self.is_web else "viewer: opening"
 
     def end_words(self) -> str:
@@ -61,9 +61,9 @@ class Viewer:
             return ""
         self.is_told = True
         if self.process.returncode == 0:
-            return "the viewer was closed; the run goes on"
+            return "the viewer was closed; the run continues"
         hint = "no display? --web serves it to a browser" if not self.is_web else f"is port {self.web_port} taken?"
-        return f"the viewer ended with exit code {self.process.returncode} ({hint}); the run goes on"
+        return f"the viewer ended with exit code {self.process.returncode} ({hint}); the run continues"
 
     def close(self) -> None:
         """End the web viewer with the run; a native one stays for the person who looks at it."""

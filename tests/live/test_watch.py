@@ -114,7 +114,7 @@ def test_a_tool_that_finds_nobody_says_where_it_looked(start: Start) -> None:
     session = start("list", "-e", "{endpoint}")
     session.endpoint = session.process.args[-1]
     assert session.wait() == 4
-    assert f"nobody of mesh 'demo' answers at {session.endpoint}" in session.output[1]
+    assert f"no peer of mesh 'demo' answers at {session.endpoint}" in session.output[1]
 
 
 def test_a_wrong_topic_is_a_mistake_of_usage(start: Start) -> None:

@@ -146,7 +146,7 @@ def _loop(engine: Filter, data: Simulation) -> Candidate:
 
 
 def _bank(kind: Any, model: LSUModel, instances: int, rows: int) -> Candidate:
-    """A plant at rest with noisy outputs, other noise for each instance: each run goes on from the last one's sets."""
+    """A plant at rest with noisy outputs, other noise for each instance; runs continue from the sets before."""
     random = np.random.default_rng(1)
     Y = random.uniform(-1.0, 1.0, (instances, rows, model.output_count)) * model.r
     U = np.zeros((instances, rows, model.input_count))

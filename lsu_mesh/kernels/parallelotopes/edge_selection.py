@@ -2,7 +2,7 @@
 
 The candidates are the columns of ``[T  G diag(widths)]`` without those of width 0. Which of them become edges is found
 in plain floating point; the zonotope is then enclosed along these edges and verified as any other
-(``kernels/enclosure.py``).
+(``kernels/parallelotopes/enclosure.py``).
 """
 
 from __future__ import annotations

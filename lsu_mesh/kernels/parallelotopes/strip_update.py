@@ -1,7 +1,8 @@
 """The strip update of a parallelotope (Vicino, Zappa 1996), sound in floating point.
 
 The set in hand is ``{c + T ξ + e : |ξ|∞ ≤ 1, |e| ≤ delta}``: ``delta`` (n,) carries what rounding has lost so far, so
-that the parallelotope itself is made to hold it only once, after the last strip (``kernels/enclosure.py``).
+that the parallelotope itself is made to hold it only once, after the last strip
+(``kernels/parallelotopes/enclosure.py``).
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Small dense linear algebra in explicit loops: approximate inverse, orthogonal basis, determinant.
 
-Nothing here is a bound by itself: whoever uses an inverse or a basis verifies it (see ``kernels/enclosure.py``).
+Nothing here is a bound by itself: the caller verifies an inverse or a basis
+(``kernels/parallelotopes/enclosure.py``).
 """
 
 from __future__ import annotations

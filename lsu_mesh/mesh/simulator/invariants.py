@@ -28,7 +28,7 @@ from lsu_mesh.mesh.simulator.recomputation import Recomputation
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
 
 FALSE_ALARMS = ("contradiction", "reset", "measurement-changed", "input-changed", "source-rejected", "quarantined")
-"""Events that accuse somebody, in a mesh in which nobody lies."""
+"""Events that must not occur in a mesh whose sources are all right."""
 
 NO_ACCUSATION = ("status restarted",)
 """Reasons why a fusion leaves a sound source out: it has only just begun again."""
@@ -84,7 +84,7 @@ class Invariants:
         self._recomputation.admitted(node, message)
 
     def published(self, node: Node, message: Message) -> None:
-        """A process has published; everything that is said must be true."""
+        """A process has published; every message must be true."""
         self._check_sequence(node, message)
         if isinstance(message, Prediction | Posterior):
             self._check_truth(message)
@@ -152,7 +152,7 @@ class Invariants:
         self.newest.setdefault(node.name, {})[message.step] = message
 
     def _check_flushed(self, node: RecorderSink, message: Health) -> None:
-        """What is said to be flushed is stored, from the first message that this recorder got."""
+        """Every message that is counted as flushed is stored, from the first that this recorder received."""
         stored = node.stored
         self._stored.update(stored[self._stored_count :])
         self._stored_count = len(stored)
@@ -163,5 +163,5 @@ class Invariants:
             first = node.ledger.first(key)
             for number in range(max(first, self._looked.get((node.boot, key, boot), 0)), seq + 1):
                 if (topic, src, boot, number) not in self._stored and not node.ledger.is_lost(key, number):
-                    raise InvariantBroken("recording", f"{key} is said to be flushed to {seq}, {number} is not stored")
+                    raise InvariantBroken("recording", f"{key} is counted as flushed to {seq}, {number} is not stored")
             self._looked[node.boot, key, boot] = seq

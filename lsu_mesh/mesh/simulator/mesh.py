@@ -233,7 +233,7 @@ class SimulatedMesh:
         return answer
 
     def _announce(self, one: Process, other: Process, at: int) -> None:
-        """Each hears of the other, and of what happens to the link between them."""
+        """Each learns of the other, and of changes of the link between them."""
         for here, there in ((one, other), (other, one)):
             changes = [(at + MILLISECOND, True), *self.links.changes(here.port.name, there.port.name)]
             for moment, is_there in changes:
@@ -258,7 +258,7 @@ class SimulatedMesh:
             self.agenda.add(at + self._rng.randint(1, 20) * MILLISECOND, self._loss_of(other, name))
 
     def _loss_of(self, here: Process, name: str) -> Callable[[int], None]:
-        """A lost link tells that a peer is gone, unless it has come back meanwhile."""
+        """A peer whose link is lost counts as gone, unless the link is open again."""
 
         def tell(at: int) -> None:
             if name not in self.processes:

@@ -19,7 +19,7 @@ class Provenance:
         self._every_input = configuration.base_model.input_count > 0 and configuration.input_box is None
 
     def role_of(self, topic: str, name: str) -> str:
-        """The role of whoever publishes a topic under a name."""
+        """The role of the peer that publishes a topic under a name."""
         return ROLE_OF_TOPIC.get(topic) or self._roles[name]
 
     def record(self, message: Message) -> None:

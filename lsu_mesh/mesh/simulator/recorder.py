@@ -1,4 +1,4 @@
-"""The recorder without its file: what it has taken, what it has flushed, and the health that says so."""
+"""The recorder without its file: what it has received, what it has flushed, and its health."""
 
 from __future__ import annotations
 

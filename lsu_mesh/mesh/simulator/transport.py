@@ -191,7 +191,7 @@ class Transport:
     # -- recovery
 
     def _miss(self, sample: Sample, sender: Port, receiver: Port, now: int) -> None:
-        """A sample was lost; the next heartbeat tells, and the subscriber asks for it."""
+        """A sample was lost; the next heartbeat shows it, and the subscriber asks for it."""
         stream = receiver.streams.setdefault((sample.key, sample.boot), Stream())
         stream.missing.add(sample.number)
         wait = self._rng.randint(2, HEARTBEAT_NS // MILLISECOND) * MILLISECOND

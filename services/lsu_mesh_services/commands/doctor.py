@@ -1,4 +1,4 @@
-"""``lsu-mesh doctor``: whether this machine can run the mesh of a configuration, and what to do where it cannot."""
+"""``lsu-mesh doctor``: whether this machine can run the mesh of a configuration, and the remedy where it cannot."""
 
 from __future__ import annotations
 

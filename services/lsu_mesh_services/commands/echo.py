@@ -1,4 +1,4 @@
-"""``lsu-mesh echo TOPIC/NAME``: the messages of a topic, decoded, as they come."""
+"""``lsu-mesh echo TOPIC/NAME``: the decoded messages of a topic, as they arrive."""
 
 from __future__ import annotations
 

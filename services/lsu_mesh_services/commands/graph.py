@@ -13,7 +13,7 @@ from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import OK, USAGE
 
 PRESENCE_S = 1.0
-"""Tokens of those who are there come at once."""
+"""Tokens of the peers that are present arrive at once."""
 SHAPES = {"sensor": "oval", "fusion": "hexagon"}
 
 
@@ -63,7 +63,8 @@ def text(peers: Sequence[Peer], found: Sequence[Flow], there: set[str] | None) -
         own = [flow for flow in found if (flow.role, flow.name) == (role, name)]
         width = max((len(flow.address) for flow in own), default=0)
         told += [
-            f"  {flow.address:<{width}} → {', '.join(other for _, other in flow.readers) or 'nobody'}" for flow in own
+            f"  {flow.address:<{width}} → {', '.join(other for _, other in flow.readers) or 'no reader'}"
+            for flow in own
         ]
     strangers = sorted((there or set()) - {name for _, name in peers})
     told += [f"{name} – there, but not of this configuration" for name in strangers]

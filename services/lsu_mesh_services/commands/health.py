@@ -1,4 +1,4 @@
-"""``lsu-mesh health``: how each peer of a running mesh does, as one more subscriber sees it."""
+"""``lsu-mesh health``: the level of each peer of a running mesh, as one more subscriber receives it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.session import session_settings, with_session
 
 SHOWN = ("received", "gaps", "duplicates", "dropped", "late", "rewinds", "contradictions", "behind", "queue", "step_ms")
-"""Counters with a column of their own; refusals are summed, and told by reason below the table."""
+"""Counters with a column of their own; refusals are summed, and listed by reason below the table."""
 TITLES = {"contradictions": "contra", "step_ms": "step ms"}
 
 

@@ -67,7 +67,7 @@ def _print_table(
     console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
     names = [f"{name} ({roles.get(name, 'not of this configuration')})" for name in roles if name in there]
     names += [f"{name} (not of this configuration)" for name in sorted(there - set(roles))]
-    console.print(f"there: {', '.join(names) or 'nobody'}", soft_wrap=True)
+    console.print(f"there: {', '.join(names) or 'no peer'}", soft_wrap=True)
     missing = [f"{name} ({role})" for name, role in roles.items() if name not in there]
     if missing:
         console.print(f"not there: {', '.join(missing)}", soft_wrap=True)

@@ -50,7 +50,7 @@ def _write_repaired(files: list[Path], target: Path, options: argparse.Namespace
     from lsu_mesh_services.recording.repair import repair
 
     if target.exists() and not options.force:
-        print(f"{target}: exists already; choose another file with -o, or say --force", file=sys.stderr)
+        print(f"{target}: exists already; choose another file with -o, or overwrite it with --force", file=sys.stderr)
         return USAGE
     before = 0
     try:

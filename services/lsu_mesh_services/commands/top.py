@@ -1,4 +1,4 @@
-"""``lsu-mesh top``: how every peer does, live."""
+"""``lsu-mesh top``: the state of every peer, live."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Listening to a mesh and summing up what was heard."""
+"""Listening to a mesh and summing up the messages."""

@@ -1,4 +1,4 @@
-"""What a run was like: one row per filter and fusion, from the messages that they published.
+"""The report of a run: one row per filter and fusion, from the messages that they published.
 
 Memory is bounded, however long a run: a step that can hardly be revised any more is only summed up.
 """

@@ -1,4 +1,4 @@
-"""The beat of a stream of messages: rate, jitter and latency, of the last so many messages."""
+"""Rate, jitter and latency of a stream, over its last messages."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from lsu_mesh_services.session import session_settings, with_session
 from lsu_mesh_services.stop import Stop
 
 LINK_S = 3.0
-"""So long a tool looks for anyone of the mesh."""
+"""How long a tool looks for a peer of the mesh."""
 
 
 class NobodyThere(Exception):
@@ -111,8 +111,8 @@ def watching(configuration: Configuration, options: argparse.Namespace) -> Itera
             if clock.now() > end:
                 where = ", ".join(settings.connect)
                 raise NobodyThere(
-                    f"nobody of mesh {configuration.mesh.name!r} answers at {where}; start it with `lsu-mesh run`, "
-                    "or say where it is with -e ENDPOINT"
+                    f"no peer of mesh {configuration.mesh.name!r} answers at {where}; start it with `lsu-mesh run`, "
+                    "or give its address with -e ENDPOINT"
                 )
             bus.next(0.02)
         yield Watch(configuration, bus, clock, stop)

@@ -46,7 +46,7 @@ def zenoh_access_control(configuration: Configuration) -> dict[str, Any]:
 
 
 def _of_peer(mesh: str, name: str, may: Access, has_token: bool) -> list[Rule]:
-    """What one peer may send, declare, ask, and be told."""
+    """What one peer may publish, declare, query and receive."""
     live = key(mesh, "live", "*")
     tokens = _beside(may.publishes) + ([key(mesh, "live", name)] if has_token else [])
     own, read = _with_beside(may.publishes), _with_beside(may.reads)

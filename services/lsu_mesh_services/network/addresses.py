@@ -31,7 +31,7 @@ def read_address(configuration: Configuration, text: str) -> Addresses:
     topic, _, name = text.removeprefix(own).partition("/")
     topics = sorted({known_topic for known_topic, _ in known})
     if topic not in topics:
-        raise WrongAddress(f"{text}: nobody publishes a topic {topic!r}; {_nearest(topic, name, topics)}")
+        raise WrongAddress(f"{text}: no peer publishes a topic {topic!r}; {_nearest(topic, name, topics)}")
     found = [address for address in known if address[0] == topic and name in ("", "*", "**", address[1])]
     if not found:
         publishers = [other for known_topic, other in known if known_topic == topic]

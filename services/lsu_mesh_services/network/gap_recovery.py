@@ -1,4 +1,4 @@
-"""Asks again for what a subscriber's own recovery has left out.
+"""Asks again for messages that a subscriber's own recovery has not brought.
 
 Advanced subscribers ask a publisher's cache once for what they missed. When that one question is lost, as it may be
 while a link comes back, the gap would stay. Admission counts gaps, and here they are asked for until they close.
@@ -12,13 +12,13 @@ from lsu_mesh.mesh.admission import Admission
 
 SECOND_NS = 1_000_000_000
 LOOK_NS = SECOND_NS // 2
-"""Between two looks. After an outage of four seconds publishers keep what was missed for two more."""
+"""Between two checks. After an outage of four seconds publishers keep what was missed for two more."""
 MAX_TRIES = 10
 """Then the messages have left the publisher's cache, or the publisher is gone."""
 LONG_QUEUE = 1024
 """So much waits to be taken, and what is missing may be in there; questions add to it, so that fewer are asked."""
 PATIENCE_NS = 2 * SECOND_NS
-"""Between two looks then: after two of them publishers still have what is missing (``CACHED_SECONDS``)."""
+"""Between two checks then: after two of them publishers still have what is missing (``CACHED_SECONDS``)."""
 
 
 class GapRecovery:

@@ -1,4 +1,4 @@
-"""Brings together again two peers whose link broke.
+"""Opens the link between two peers again after it broke.
 
 Gossip tells a peer once where another one is. When the connection of two of them breaks, or the first attempt fails,
 neither tries again: each takes the other for dead while everybody else hears both. So whoever misses a peer asks an

@@ -1,4 +1,4 @@
-"""What has come and waits to be taken: bounded, so that a peer that cannot keep up says so instead of growing."""
+"""Messages that have arrived and wait: bounded, so that a slow peer drops and counts them and does not grow."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import threading
 from typing import NamedTuple
 
 MAX_MESSAGES, MAX_BYTES = 65536, 2**26
-"""What waits at the most; what comes then is dropped and counted, and may be asked for again later."""
+"""Messages and bytes that may wait; a message beyond that is dropped and counted, and may be requested again."""
 
 
 class Arrival(NamedTuple):

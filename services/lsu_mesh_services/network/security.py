@@ -1,4 +1,4 @@
-"""The secure side of a session: certificates by name, and no open door by accident."""
+"""The secure side of a session: certificates by name, and the refusal to listen for other hosts without TLS."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def check_endpoints(listen: Sequence[str], settings: Sequence[str], *, insecure:
         if is_open_to_others(endpoint):
             raise InsecureSession(
                 f"listening on {endpoint} is refused: whoever reaches it could read and write the mesh; "
-                "enable [network.tls] (see `lsu-mesh keys init`), or say --insecure where the network itself is closed"
+                "enable [network.tls] (see `lsu-mesh keys init`), or add --insecure where the network itself is closed"
             )
     for setting in settings:
         if setting.startswith("listen/"):

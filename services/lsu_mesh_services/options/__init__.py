@@ -1,1 +1,1 @@
-"""The arguments of each command, one file a group; light imports only, because ``--help`` reads them all."""
+"""The options of each command, one file a group; light imports only, because ``--help`` reads them all."""

@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh bench``."""
+"""Options of ``lsu-mesh bench``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def add(commands: Commands) -> None:
     parser.add_argument(
         "--benchmarks", nargs="+", default=[], metavar="FILE", help="tightness: JSON files of published benchmarks"
     )
-    parser.add_argument("--quick", action="store_true", help="few sizes and rounds: shows that it works, not how fast")
+    parser.add_argument("--quick", action="store_true", help="few sizes and rounds: a trial, whose numbers mean little")
     parser.add_argument("--out", metavar="DIR", help="folder for the figure and the JSON file (needs matplotlib)")
     parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of tables")
     parser.set_defaults(

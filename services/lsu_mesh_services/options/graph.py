@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh graph``."""
+"""Options of ``lsu-mesh graph``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh health``."""
+"""Options of ``lsu-mesh health``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from lsu_mesh_services.options.parsing import Commands, add_network, add_overrid
 def add(commands: Commands) -> None:
     """The command ``health``."""
     parser = new_command(
-        commands, "health", "listen to a running mesh and tell how each peer does; the worst level counts"
+        commands,
+        "health",
+        "print the level of each peer of a running mesh, with reasons; the exit code follows the worst level",
     )
     parser.add_argument("-c", "--config", metavar="mesh.toml", help="configuration (default: the packaged demo)")
     parser.add_argument("--seconds", type=float, default=3.5, metavar="S", help="how long to listen (default: 3.5)")

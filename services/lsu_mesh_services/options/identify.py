@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh identify``."""
+"""Options of ``lsu-mesh identify``."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def add(commands: Commands) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--learn", choices=LEARN, default="both",
-        help="which half-widths grow: both, r or rho by one factor, or each for itself (default: both)",
+        help="which half-widths grow: both, r or rho by one factor, or each by itself (default: both)",
     )  # fmt: skip
     parser.add_argument(
         "--unknown", metavar="M,I,J,LOW,HIGH", action="append", default=[],
@@ -31,7 +31,7 @@ def add(commands: Commands) -> None:
         "--share", type=float, default=0.5, metavar="X",
         help="share of the data that is used; the bounds are tried on the rest (default: 0.5)",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of words")
+    parser.add_argument("--json", action="store_true", help="one JSON line on stdout instead of text")
     add_overrides(parser)
     parser.set_defaults(
         handler="lsu_mesh_services.commands.identify", extra=lambda options: RECORD if options.recording else None

@@ -1,4 +1,4 @@
-"""What the arguments of several commands share."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def add_network(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--cfg", metavar="PATH:VALUE", action="append", default=[], help="any setting of Zenoh")
     scouting = group.add_mutually_exclusive_group()
     scouting.add_argument("--multicast-scouting", action="store_true", help="find peers by multicast too")
-    scouting.add_argument("--no-multicast-scouting", action="store_true", help="the default, for scripts that say so")
+    scouting.add_argument("--no-multicast-scouting", action="store_true", help="the default; for scripts that state it")
 
 
 def add_insecure(group: argparse._ActionsContainer) -> None:
     """``--insecure``: listening for other hosts without TLS is meant."""
     group.add_argument(
         "--insecure", action="store_true",
-        help="listen for other hosts without TLS too, because the network itself is closed",
+        help="allow listening for other hosts without TLS, where the network itself is closed",
     )  # fmt: skip

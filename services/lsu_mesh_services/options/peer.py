@@ -1,4 +1,4 @@
-"""Arguments of the commands that run one peer: a role of the mesh, or a router."""
+"""Options of the commands that run one peer: a role of the mesh, or a router."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh recording``."""
+"""Options of ``lsu-mesh recording``."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ def add(commands: Commands) -> None:
     info = _new(inner, "info", "what a recording holds: run, peers, messages, gaps, events")
     info.add_argument("file", metavar="FILE.rrd", help="recording; its parts are found beside it")
     info.add_argument("--json", action="store_true", help="one JSON object on stdout")
-    repair = _new(inner, "repair", "make a file that opens of one that was cut short, and smaller in any case")
-    repair.add_argument("file", metavar="FILE.rrd", help="recording to mend; it stays as it is, unless -o names it")
+    repair = _new(inner, "repair", "write a file that opens, from one that was cut short; it is also smaller")
+    repair.add_argument("file", metavar="FILE.rrd", help="recording to repair; it is not changed, unless -o names it")
     _add_output(repair, "FILE.repaired.rrd")
-    merge = _new(inner, "merge", "join the parts of a recorder that was started again into one recording")
+    merge = _new(inner, "merge", "join the parts that a restarted recorder wrote into one recording")
     merge.add_argument("files", metavar="FILE.rrd", nargs="+", help="parts; of one file its later parts are found")
     _add_output(merge, "FILE.merged.rrd")
     export = _new(inner, "export", "tables for other programs, and measurements as files that sensors play")

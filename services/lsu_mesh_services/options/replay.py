@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh replay``."""
+"""Options of ``lsu-mesh replay``."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ def add(commands: Commands) -> None:
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
         "--verify", action="store_true",
-        help="recompute every published set from its provenance, compare bit by bit, look for the truth in it",
+        help="recompute every published set from its provenance, compare it bit by bit, check that it holds the truth",
     )  # fmt: skip
-    what.add_argument("--live", action="store_true", help="as peers over Zenoh, at the recorded pace")
+    what.add_argument(
+        "--live", action="store_true", help="run filters and fusions as peers over Zenoh, at the recorded rate"
+    )
     parser.add_argument("--with", dest="other", metavar="other.toml", help="filters and fusions of another mesh")
-    parser.add_argument("--record", metavar="OUT.rrd", help="recording of the replay; with --with it shows both")
+    parser.add_argument(
+        "--record", metavar="OUT.rrd", help="write a recording of the replay; with --with it shows both"
+    )
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout instead of a table")
     parser.add_argument(
         "-X", dest="overrides", metavar="TABLE.KEY=VALUE", action="append", default=[],

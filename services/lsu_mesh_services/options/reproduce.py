@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh reproduce``."""
+"""Options of ``lsu-mesh reproduce``."""
 
 from __future__ import annotations
 
@@ -46,7 +46,10 @@ def add(commands: Commands) -> None:
     )
     listed = "; ".join(f"{what}: {experiment.words}" for what, experiment in REPRODUCIBLE.items())
     parser.add_argument(
-        "what", metavar="WHAT", choices=(*REPRODUCIBLE, ALL), help=f"{listed}; {ALL}: everything, and a page about it"
+        "what",
+        metavar="WHAT",
+        choices=(*REPRODUCIBLE, ALL),
+        help=f"{listed}; {ALL}: every experiment, and a page with all results",
     )
     parser.add_argument("--quick", action="store_true", help="fewer seeds and steps")
     parser.add_argument("--json", action="store_true", help="JSON lines on stdout instead of tables")

@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh run``."""
+"""Options of ``lsu-mesh run``."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from lsu_mesh_services.options.parsing import Commands, add_insecure, add_overri
 
 def add(commands: Commands) -> None:
     """The command ``run``."""
-    parser = new_command(commands, "run", "start a whole mesh as processes, record it, and sum it up")
+    parser = new_command(commands, "run", "start a whole mesh as processes, record it, and print a summary")
     parser.add_argument("file", nargs="?", metavar="mesh.toml", help="configuration (default: the packaged demo)")
     parser.add_argument("--steps", type=int, metavar="N", help="stop after step N (mesh.steps)")
     parser.add_argument("--rate", type=float, metavar="HZ", help="steps per second of wall clock (default: 1/dt)")
     parser.add_argument("--seed", type=int, metavar="S", help="seed of the simulation (mesh.seed)")
     parser.add_argument("--record", metavar="FILE", help="recording to write (default: recorder.path)")
     parser.add_argument("--no-record", action="store_true", help="start no recorder")
-    parser.add_argument("--view", action="store_true", help="follow in the native viewer; it may come, freeze and go")
+    parser.add_argument(
+        "--view", action="store_true", help="show the run in the native viewer, which may freeze or be closed"
+    )
     parser.add_argument(
         "--web", nargs="?", type=int, const=9090, metavar="PORT",
         help="serve the web viewer on this port of the loopback interface (default: 9090)",

@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh simulate``."""
+"""Options of ``lsu-mesh simulate``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from lsu_mesh_services.options.parsing import Commands, new_command
 def add(commands: Commands) -> None:
     """The command ``simulate``."""
     parser = new_command(
-        commands, "simulate", "run the whole mesh in one process under seeded faults, checking all it says"
+        commands, "simulate", "run the whole mesh in one process under seeded faults and check every message"
     )
     parser.add_argument("file", nargs="?", metavar="mesh.toml", help="configuration (default: the packaged demo)")
     parser.add_argument("--seeds", type=int, default=100, metavar="N", help="how many seeds (default: 100)")

@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh validate``."""
+"""Options of ``lsu-mesh validate``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arguments of ``lsu-mesh view``."""
+"""Options of ``lsu-mesh view``."""
 
 from __future__ import annotations
 

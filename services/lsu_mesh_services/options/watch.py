@@ -1,4 +1,4 @@
-"""Arguments of the commands that look at a running mesh: ``list echo hz top``."""
+"""Options of the commands that observe a running mesh: ``list echo hz top``."""
 
 from __future__ import annotations
 
@@ -28,11 +28,13 @@ def _add_list(commands: Commands) -> None:
 
 def _add_echo(commands: Commands) -> None:
     example = "lsu-mesh echo posterior/cz --field upper -n 3"
-    parser = _tool(commands, "echo", "print the messages of a topic as they come, decoded", example)
+    parser = _tool(commands, "echo", "print the decoded messages of a topic as they arrive", example)
     parser.add_argument("address", metavar=ADDRESS, help=ADDRESS_HELP)
-    parser.add_argument("--field", metavar="FIELD", help="only this, such as upper, upper.0 or support.type")
+    parser.add_argument("--field", metavar="FIELD", help="print only this part, such as upper, upper.0 or support.type")
     parser.add_argument("-n", "--count", type=_count, metavar="N", help="end after N messages (default: until Ctrl-C)")
-    parser.add_argument("--timeout", type=_seconds, metavar="S", help="give up after so long: exit code 4")
+    parser.add_argument(
+        "--timeout", type=_seconds, metavar="S", help="end after so long without enough messages, with exit code 4"
+    )
     parser.set_defaults(handler="lsu_mesh_services.commands.echo")
 
 
@@ -46,7 +48,9 @@ def _add_hz(commands: Commands) -> None:
 def _add_top(commands: Commands) -> None:
     words = "watch how every peer does: level, step, rate, latency, gaps, queue, time of a step"
     parser = _tool(commands, "top", words, "lsu-mesh top --once")
-    parser.add_argument("--once", action="store_true", help="one table; this is so where stdout is no terminal")
+    parser.add_argument(
+        "--once", action="store_true", help="print one table and end; the default where stdout is no terminal"
+    )
     _add_seconds(parser, 3.5, "how long --once listens (default: 3.5)")
     parser.set_defaults(handler="lsu_mesh_services.commands.top")
 

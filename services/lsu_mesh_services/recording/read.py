@@ -127,14 +127,14 @@ def read_raw(*paths: Path, refused: bool = False) -> list[RawMessage]:
 
 
 def _repaired(path: Path, read: Callable[[Path], list[Found]]) -> list[Found]:
-    """What ``read`` finds; of a file in which a message is cut short, what is whole, from a mended copy."""
+    """What ``read`` finds; of a file in which a message is cut short, what is whole, from a repaired copy."""
     if not path.is_file():
         raise FileNotFoundError(2, "no such recording", str(path))
     try:
         return read(path)
     except RuntimeError:
         with tempfile.TemporaryDirectory(prefix="read-") as folder:
-            copy = Path(folder) / "mended.rrd"
+            copy = Path(folder) / "repaired.rrd"
             repair([path], copy)
             return read(copy)
 

@@ -30,7 +30,7 @@ from lsu_mesh_services.recording.topology import Topology
 NOTHING: Mapping[str, str] = MappingProxyType({})
 FLUSH_TIMEOUT_S = 5.0
 HANGS_S = 20.0
-"""Drawing, sending and a flush that keeps its own time limit take less on a busy machine; more is for ever."""
+"""Drawing, sending and a flush that keeps its own time limit take less on a busy machine; more never ends."""
 LEAST_FREE = 2**20
 """Bytes that are left on the disk, beside what two flushes take."""
 CLOSING_S = 60.0
@@ -38,7 +38,7 @@ CLOSING_S = 60.0
 WRITER_ENDED = "File-writer thread shut down"
 """What a flush says after an error of the disk, from which Rerun's writer does not come back."""
 GOING_ON_NS = 300_000_000
-"""Data that come so long after a departure show that the mesh goes on."""
+"""Data that arrive so long after a departure show that the mesh continues."""
 AFTERMATH_NS = 3_000_000_000
 """How long a departure may be the beginning of the end of the run."""
 DRAWING_INTERVAL_S = 1.0
@@ -142,7 +142,7 @@ class Recorder:
             self._guarded(f"drawing {message.topic} of {message.src}", lambda: self._draw(message, arrival_ns))
 
     def peer_changed(self, role: str, name: str, alive: bool, now_ns: int) -> None:
-        """A peer came or went. At the end of a run all go: a departure is drawn when the mesh goes on without it."""
+        """A peer came or went. At the end of a run all go: a departure is drawn once the mesh continues without it."""
         if alive:
             self._draw_departures(now_ns, patience_ns=0)
             presence = _Presence(role, name, True, self._now(now_ns))

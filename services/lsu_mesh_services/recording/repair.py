@@ -1,8 +1,7 @@
-"""Mending, joining and compacting recordings, on top of ``rerun rrd optimize``.
+"""Repairing, joining and compacting recordings, on top of ``rerun rrd optimize``.
 
 A recorder that was killed in the middle of a write, or a full disk, leaves a message cut short; viewer and reader
-refuse such a file. Mended, it holds every whole message. Compacted, a recording takes half of the space and opens
-faster.
+refuse such a file. A repaired file holds every whole message. A compacted one takes half of the space and opens faster.
 """
 
 from __future__ import annotations
@@ -25,12 +24,12 @@ def repair(sources: Sequence[Path], target: Path) -> None:
     """
     for source in sources:
         _check(source)
-    with tempfile.TemporaryDirectory(prefix=".mend-", dir=target.parent) as folder:
+    with tempfile.TemporaryDirectory(prefix=".repair-", dir=target.parent) as folder:
         made = Path(folder) / "made.rrd"
         command = [str(Path(sys.executable).with_name("rerun")), "rrd", "optimize", *map(str, sources), "-o", str(made)]
         done = subprocess.run(command, capture_output=True, text=True, check=False, env=quiet_environment())
         if done.returncode != 0 or not made.is_file():
-            raise ValueError(f"{', '.join(map(str, sources))}: cannot be mended: {done.stderr.strip()[-500:]}")
+            raise ValueError(f"{', '.join(map(str, sources))}: cannot be repaired: {done.stderr.strip()[-500:]}")
         os.replace(made, target)
 
 

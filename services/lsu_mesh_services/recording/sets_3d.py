@@ -24,16 +24,16 @@ from lsu_mesh_services.recording.set_geometry import EMPTY, SetGeometry, body, p
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
 MAX_PAUSE_NS = 2_000_000_000
-"""However slow the bodies are, some are drawn."""
+"""Bodies that are drawn at least, however slow they are."""
 GRACE_NS = 1_000_000_000
-"""How long a chosen step waits for its last set; all sets of one moment shall be of one step."""
+"""How long a chosen step waits for its last set, so that all sets that are shown together belong to one step."""
 REMEMBERED = 256
 """Chosen steps, and truths, that are kept for sets and truths that come late."""
 SHARE = 0.15
 """Largest share of the wall clock that may go into bodies."""
 
 CROSS = 1.1
-"""OpenLoop of the lines through the truth, in units of the view."""
+"""Length of the lines through the truth, in units of the view."""
 IN_FRONT = 0.03
 """How far in front of flat sets the truth is drawn."""
 FLAT = rr.components.PointShading.Flat

@@ -70,8 +70,8 @@ def recording_id(path: Path) -> str | None:
             return _recording_id(path)
         except RuntimeError:
             with tempfile.TemporaryDirectory(prefix="part-") as folder:
-                repair([path], Path(folder) / "mended.rrd")
-                return _recording_id(Path(folder) / "mended.rrd")
+                repair([path], Path(folder) / "repaired.rrd")
+                return _recording_id(Path(folder) / "repaired.rrd")
     except (OSError, ValueError):
         return None
 

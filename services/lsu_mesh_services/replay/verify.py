@@ -92,7 +92,7 @@ def _verdict(report: Report) -> list[str]:
 def _about_truth(report: Report) -> list[str]:
     containment = report.found.containment
     if not containment.archive.truth:
-        return ["the truth is not recorded: nothing to say about containment"]
+        return ["the truth is not recorded: containment was not checked"]
     lines = [f"{containment.holding} sets of steps whose truth is recorded hold it"]
     if containment.misses:
         lines.append(f"{len(containment.misses)} sets that must hold the truth miss it; first:")

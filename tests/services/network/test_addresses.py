@@ -28,12 +28,12 @@ def test_a_name_or_a_whole_key_means_one(configuration: Configuration, text: str
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("posteriors/cz", "nobody publishes a topic 'posteriors'; did you mean \"posterior/cz\"?"),
+        ("posteriors/cz", "no peer publishes a topic 'posteriors'; did you mean \"posterior/cz\"?"),
         ("mesurement", 'did you mean "measurement"?'),
         ("posterior/cs", "no 'cs' publishes posterior; did you mean \"posterior/cz\"?"),
         ("measurement/plant", "no 'plant' publishes measurement"),
         ("lsu/v1/other/fused/main", "the mesh of this configuration is 'demo'"),
-        ("bounds", "nobody publishes a topic 'bounds'"),
+        ("bounds", "no peer publishes a topic 'bounds'"),
     ],
 )
 def test_a_wrong_one_names_the_nearest(configuration: Configuration, text: str, words: str) -> None:
