@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
-from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.transfer_gain import hull_gain
 from lsu_mesh.filters.validation import (
@@ -74,6 +74,7 @@ class LSUCZ(Filter):
     """
 
     kind: ClassVar[str] = "LSUCZ"
+    guarantee: ClassVar[Guarantee] = "declared"
     _held: Held
     _support: ConstrainedZonotope | None
     _bounds: tuple[Vector, Vector] | None

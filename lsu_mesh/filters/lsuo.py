@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -41,6 +42,7 @@ class LSUO(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUO"
+    guarantee: ClassVar[Guarantee] = "declared"
     family: ClassVar[int] = filter_step.BOX
 
     def __init__(

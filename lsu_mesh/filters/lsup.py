@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.kernels.parallelotopes import parallelotope
 from lsu_mesh.model import LSUModel
@@ -59,6 +60,7 @@ class LSUP(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUP"
+    guarantee: ClassVar[Guarantee] = "declared"
     family: ClassVar[int] = filter_step.PARALLELOTOPE
 
     def __init__(

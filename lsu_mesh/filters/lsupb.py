@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.intersection import Intersection
@@ -40,6 +41,7 @@ class LSUPB(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUPB"
+    guarantee: ClassVar[Guarantee] = "declared"
     family: ClassVar[int] = filter_step.BUNDLE
 
     def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.transfer_gain import hull_gain
 from lsu_mesh.filters.validation import (
@@ -76,6 +76,7 @@ class ZonotopicKalman(Filter):
     """
 
     kind: ClassVar[str] = "ZonotopicKalman"
+    guarantee: ClassVar[Guarantee] = "declared"
     _held: Held
 
     def __init__(

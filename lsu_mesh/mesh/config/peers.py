@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.filters.registry import FILTERS, filter_class
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.registry import filter_class, filter_kinds
 from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
 from lsu_mesh.mesh.config.settings import (
     FilterSettings,
@@ -140,7 +141,7 @@ def read_filter(
 
     ``peers`` holds the names of all ``filters`` and ``fusion`` tables.
     """
-    kind = table.choice("kind", tuple(FILTERS), REQUIRED)
+    kind, cls = _read_kind(table)
     chosen = _read_names(table, "sensors", sensors)
     deadline = table.duration("deadline", 0.05)
     history = table.whole("history", 32, low=1, high=4096)
@@ -150,11 +151,11 @@ def read_filter(
     reset_after = table.whole("reset_after", 5, low=1)
     adopt = _read_adopt(table, peers["identifier"], model)
     options = table.rest()
-    if isinstance(kind, str) and kind in FILTERS:
-        _check_options(table, kind, options, sensors, chosen, model, prior)
+    if cls is not None:
+        _check_options(table, cls, options, sensors, chosen, model, prior)
     return FilterSettings(
         name,
-        str(kind),
+        kind,
         chosen,
         deadline,
         history,
@@ -165,6 +166,22 @@ def read_filter(
         options,
         adopt,
     )
+
+
+def _read_kind(table: Table) -> tuple[str, type[Filter] | None]:
+    """``kind``, a name or ``"module:Class"``, as it is written, and its class; ``None`` where there is none."""
+    kind = table.text("kind")
+    if not isinstance(kind, str):
+        return "", None
+    if ":" not in kind:
+        table.choice("kind", filter_kinds(), REQUIRED)
+        if kind not in filter_kinds():
+            return kind, None
+    try:
+        return kind, filter_class(kind)
+    except ModelError as error:
+        table.wrong("kind", str(error))
+        return kind, None
 
 
 def _read_adopt(table: Table, identifiers: Collection[str], model: LSUModel | None) -> str:
@@ -204,14 +221,13 @@ _OWN = (
 
 def _check_options(
     table: Table,
-    kind: str,
+    cls: type[Filter],
     options: Mapping[str, object],
     sensors: Mapping[str, SensorSettings],
     chosen: tuple[str, ...],
     model: LSUModel | None,
     prior: Orthotope | None,
 ) -> None:
-    cls = filter_class(kind)
     known = [key for key in inspect.signature(cls).parameters if key not in ("model", "prior")]
     for key in known:
         table.problems.asked.add(f"{table.path}.{key}")
@@ -267,7 +283,12 @@ def read_identifier(table: Table, name: str, sensors: Mapping[str, SensorSetting
 
 def is_guaranteed(kind: object) -> bool:
     """Whether the sets of filters of this kind hold the state as long as the bounds do."""
-    return not isinstance(kind, str) or kind not in FILTERS or filter_class(kind).guarantee == "declared"
+    if not isinstance(kind, str):
+        return True
+    try:
+        return filter_class(kind).guarantee == "declared"
+    except ModelError:  # said where the filter's table is read
+        return True
 
 
 def check_learning(
