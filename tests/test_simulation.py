@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_plant import exact_product
+from lsu_mesh.testing.exact_plant import exact_product
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_plant import KINDS, Case, Exact, draw_case, exact_product, exact_steps, inside_box
+from lsu_mesh.testing.exact_plant import KINDS, Case, Exact, draw_case, exact_product, exact_steps, inside_box
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
