@@ -52,7 +52,8 @@ def filter_class(kind: str) -> type[Filter]:
         return _loaded(kind, module, name)
     found = _installed().get(kind, ())
     if not found:
-        raise ModelError(f"there is no filter {kind!r}{_hint(kind)} (valid: {', '.join(filter_kinds())}, or module:Class)")
+        valid = ", ".join((*filter_kinds(), "module:Class"))
+        raise ModelError(f"there is no filter {kind!r}{_hint(kind)} (valid: {valid})")
     values = sorted({point.value for point in found})
     if len(values) > 1:
         raise ModelError(

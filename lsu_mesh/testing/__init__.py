@@ -7,5 +7,8 @@ expected; it needs no test framework. The truth is exact: rational numbers, no t
 from __future__ import annotations
 
 from lsu_mesh.testing.filter_contract import check_filter
+from lsu_mesh.testing.policy_contract import check_policy
+from lsu_mesh.testing.support_contract import check_support
+from lsu_mesh.testing.support_samples import Sample
 
-__all__ = ["check_filter"]
+__all__ = ["Sample", "check_filter", "check_policy", "check_support"]

@@ -1,4 +1,4 @@
-"""Whole problems for a filter: a model, a prior, and a true path in exact rationals, at the edges of what is allowed."""
+"""Problems for a filter: a model, a prior, and a true path in exact rationals, at the edges of what is allowed."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def draw_problem(seed: int, steps: int) -> Problem:
         path.append(moment)
     model = case.model
     if kind == "domain":
-        model = model.replace(domain=_box_around([moment.x for moment in path]))
+        model = model.replace(domain=box_around([moment.x for moment in path]))
     return Problem(kind, seed, model, case.prior, tuple(path))
 
 
@@ -108,7 +108,7 @@ def around(x: Exact, shape: str, widths: Vector, own: Support, rng: np.random.Ge
     if shape == "own set":
         return own
     if shape == "box":
-        corner = _box_around([x])
+        corner = box_around([x])
         is_lower = rng.random(n) < 0.5
         return Orthotope(
             np.where(is_lower, corner.lower, corner.lower - half), np.where(is_lower, corner.upper + half, corner.upper)
@@ -133,7 +133,7 @@ def common_points(
     return found
 
 
-def _box_around(points: list[Exact]) -> Orthotope:
+def box_around(points: list[Exact]) -> Orthotope:
     """The smallest box of doubles that holds exact points (n,)."""
     columns = list(zip(*points, strict=True))
     return Orthotope(

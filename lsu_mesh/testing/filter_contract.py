@@ -26,7 +26,7 @@ SEEDS = 57
 TRANSFERS = 3
 """How often the same set is transferred: a copy says nothing new, so no common point may be lost by it."""
 MAX_ENUMERATED = 3
-"""States up to which common points beside the true state are looked for: the vertices of sets in more dimensions take long."""
+"""States up to which common points beside the true state are looked for: vertices in more dimensions take long."""
 DIRECTIONS = 3
 """Random directions in which the support function is compared with the truth."""
 
@@ -52,8 +52,8 @@ def check_filter(make: Make, seeds: int | Iterable[int] = SEEDS, steps: int = 5,
     AssertionError
         Names the case, its seed and step, what was found and what was expected.
 
-    A filter with ``guarantee = "none"`` is checked for what it promises only: shapes, finite numbers, snapshots, and the
-    state kept after an error.
+    A filter with ``guarantee = "none"`` is checked for what it promises only: shapes, finite numbers, snapshots, and
+    the state kept after an error.
     """
     probe = make(LSUModel([[1.0]], None, [[1.0]], 0.1, 0.1, domain=([-9.0], [9.0])), Orthotope([-1.0], [1.0]))
     if not isinstance(probe, Filter):
@@ -203,5 +203,3 @@ class _Run:
 
 def _shown(x: Exact) -> str:
     return str([float(v) for v in x])
-
-

@@ -13,6 +13,7 @@ from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.testing.exact_plant import Exact, Vector, inside_box
 
+
 def is_outside(support: Support, x: Exact, *, decided: bool = True) -> bool:
     """Whether the exact point x (n,) is surely outside of the set; no tolerance.
 

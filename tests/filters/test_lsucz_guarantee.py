@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lsu_mesh.testing.exact_plant import KINDS, Case, Exact, draw_case, exact_product, exact_steps, inside_box
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,6 +14,7 @@ from lsu_mesh.filters.filter import Filter
 from lsu_mesh.supports import reduction
 from lsu_mesh.supports.exact import Membership
 from lsu_mesh.supports.linear_programs import Maxima
+from lsu_mesh.testing.exact_plant import KINDS, Case, Exact, draw_case, exact_product, exact_steps, inside_box
 
 Maker = Callable[[LSUModel, Orthotope], Filter]
 MAKERS: dict[str, Maker] = {

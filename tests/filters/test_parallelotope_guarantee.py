@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from lsu_mesh.testing.exact_plant import KINDS, Case, Exact, draw_case, exact_product, exact_steps, inside_box
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,6 +14,7 @@ from lsu_mesh import LSUO, LSUP, LSUPB, Intersection, LSUModel, Orthotope, Paral
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
 from lsu_mesh.supports.support import Support
+from lsu_mesh.testing.exact_plant import KINDS, Case, Exact, draw_case, exact_product, exact_steps, inside_box
 
 Maker = Callable[[LSUModel, Orthotope], Filter]
 MAKERS: dict[str, Maker] = {

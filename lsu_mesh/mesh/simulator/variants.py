@@ -1,8 +1,8 @@
 """Which mesh a seed simulates: the configuration as it is, or with other transfers, limits, domain or inputs.
 
 The kinds of filters are those of the configuration, whichever they are. Only constrained zonotopes are made small or
-replaced where the seed does not take the mesh as it is, and the variant's text says so: a linear program costs more than
-all the rest of a step, and the nodes around it are what is tested.
+replaced where the seed does not take the mesh as it is, and the variant's text says so: a linear program costs more
+than all the rest of a step, and the nodes around it are what is tested.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Conf
     base = load(file, (f"mesh.steps={steps}", f"mesh.seed={mesh_seed}", f"mesh.rate={RATE}"))
     if not variant.kinds:
         return base
-    small = {
+    small: dict[str, Any] = {
         "max_generators": max(MAX_GENERATORS, base.base_model.state_count),
         "max_constraints": MAX_CONSTRAINTS,
     }
