@@ -21,6 +21,7 @@ LAYERS = {
     "lsu_mesh.filters": 5,
     "lsu_mesh.fusion": 5,
     "lsu_mesh.identification": 6,
+    "lsu_mesh.testing": 6,
     "lsu_mesh.experiments": 6,
     "lsu_mesh.mesh": 7,
     "lsu_mesh_services": 8,

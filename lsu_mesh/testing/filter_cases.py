@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
@@ -35,7 +36,7 @@ SHARE = Fraction(999_999, 1_000_000)
 """Where on the way from the true state to a vertex a common point is looked for: vertices are rounded."""
 MAX_CANDIDATES = 8
 """Vertices that are tried, for each exact decision takes milliseconds."""
-SHAPES = ("box", "parallelotope", "zonotope", "own set")
+SHAPES = ("box", "parallelotope", "zonotope", "intersection", "constrained zonotope", "own set")
 """Sets of another filter that a filter is conditioned on."""
 
 
@@ -107,12 +108,17 @@ def around(x: Exact, shape: str, widths: Vector, own: Support, rng: np.random.Ge
     half = np.where(widths > 0, widths, 1e-3 * np.array([abs(float(v)) for v in x]) + 1e-3) * rng.uniform(0.05, 0.5, n)
     if shape == "own set":
         return own
+    corner, is_lower = box_around([x]), rng.random(n) < 0.5
+    box = Orthotope(
+        np.where(is_lower, corner.lower, corner.lower - half), np.where(is_lower, corner.upper + half, corner.upper)
+    )
     if shape == "box":
-        corner = box_around([x])
-        is_lower = rng.random(n) < 0.5
-        return Orthotope(
-            np.where(is_lower, corner.lower, corner.lower - half), np.where(is_lower, corner.upper + half, corner.upper)
-        )
+        return box
+    if shape in ("intersection", "constrained zonotope"):
+        body = around(x, "parallelotope", widths, own, rng)
+        if body is None:
+            return None
+        return Intersection([body, box]) if shape == "intersection" else body.intersect(box)
     g = n if shape == "parallelotope" else n + 2
     G = half[:, None] * rng.normal(size=(n, g))
     center = np.array([float(v) for v in x]) - 0.9999 * (G @ rng.choice([-1.0, 1.0], size=g))

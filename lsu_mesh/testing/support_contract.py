@@ -12,7 +12,7 @@ from lsu_mesh.errors import ModelError
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.testing.exact_plant import Exact, Matrix, Vector, exact_product, inside_box
-from lsu_mesh.testing.filter_cases import around
+from lsu_mesh.testing.filter_cases import SHAPES, around
 from lsu_mesh.testing.membership import exceeds, is_outside, numbers_of
 from lsu_mesh.testing.support_samples import Draw, Sample, draw_for
 
@@ -161,8 +161,7 @@ class _Check:
         """Sets of other classes, x at the edge of each."""
         lower, upper = self._set.bounds()
         made = [
-            around(x, shape, np.maximum(upper - lower, 0.1 * self._scale), self._set, self._rng)
-            for shape in ("box", "parallelotope", "zonotope", "own set")
+            around(x, shape, np.maximum(upper - lower, 0.1 * self._scale), self._set, self._rng) for shape in SHAPES
         ]
         return [one for one in made if one is not None]
 
