@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lsu_mesh.mesh.config import Configuration, load
+from lsu_mesh.mesh.config.peers import is_guaranteed
 from lsu_mesh.mesh.config.settings import FilterSettings
 from lsu_mesh.supports.orthotope import Orthotope
 
@@ -74,8 +75,11 @@ def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Conf
     filters = {name: _of_kind(base.filters[name], kind, small) for name, kind in variant.kinds}
     name, way = variant.transfer
     if name:
-        senders = base.fusion if way == "fused" else [other for other in filters if other != name]
-        filters[name] = replace(filters[name], transfer=way, transfer_from=tuple(sorted(senders)))
+        # only sets that are guaranteed: an estimate that misses the truth would accuse a true measurement
+        sound = [other for other, settings in filters.items() if other != name and is_guaranteed(settings.kind)]
+        senders = base.fusion if way == "fused" else sound
+        if senders:
+            filters[name] = replace(filters[name], transfer=way, transfer_from=tuple(sorted(senders)))
     fusion = {name: replace(settings, **small) for name, settings in base.fusion.items()}
     return _extended(replace(base, filters=filters, fusion=fusion), variant.extra)
 
