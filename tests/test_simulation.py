@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_plant import exact_product
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lsu_mesh import LSUModel, ModelError, simulate, systems
 from lsu_mesh.simulation import measure, next_state, random_corner, random_normal, random_uniform
+from lsu_mesh.testing.exact_plant import exact_product
 
 
 def test_values_are_functions_of_seed_name_and_step() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from abc import ABC, abstractmethod
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,8 +33,28 @@ class Filter(ABC):
     """
 
     kind: ClassVar[str]
-    guarantee: ClassVar[Guarantee] = "declared"
-    """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates."""
+    """Name in errors; a class that states none is called by its class name."""
+    guarantee: ClassVar[Guarantee]
+    """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates.
+
+    It has no default: a filter promises only what its author has written down.
+    """
+
+    def __init_subclass__(cls) -> None:
+        """Raises ``TypeError`` for a class that can be made and does not state its guarantee."""
+        super().__init_subclass__()
+        if "kind" not in cls.__dict__:
+            cls.kind = cls.__name__
+        stated = getattr(cls, "guarantee", None)
+        if stated is None and inspect.isabstract(cls):
+            return
+        if stated not in get_args(Guarantee):
+            found = "states no guarantee" if stated is None else f"states the guarantee {stated!r}"
+            raise TypeError(
+                f"the filter {cls.__module__}.{cls.__qualname__} {found}; write in its class "
+                '`guarantee = "declared"` if its sets hold the state whenever the declared bounds hold '
+                '(lsu_mesh.testing.check_filter tests it), or `guarantee = "none"` if they are estimates'
+            )
 
     @property
     @abstractmethod

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -39,6 +40,7 @@ class LSUO(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUO"
+    guarantee: ClassVar[Guarantee] = "declared"
     family: ClassVar[int] = filter_step.BOX
 
     def __init__(
@@ -65,6 +67,15 @@ class LSUO(CompiledFilter):
     @staticmethod
     def _make_support(state: Matrix) -> Orthotope:
         return Orthotope.trusted(state[0], state[1])
+
+    def condition(self, support: Support) -> float:
+        """Bayesian transfer that never widens :meth:`bounds`, also where the data update may (``meet=False``)."""
+        before, volume = self._state, self._log_volume(self._state)
+        gain = super().condition(support)
+        if self.meet:
+            return gain
+        self._state = np.array([np.maximum(self._state[0], before[0]), np.minimum(self._state[1], before[1])])
+        return max(0.0, volume - self._log_volume(self._state)) if volume > -np.inf else 0.0
 
     def _cut(self, state: Matrix, C: Matrix, y: Vector, r: Vector) -> tuple[Matrix, int]:
         new, status = super()._cut(state, C, y, r)

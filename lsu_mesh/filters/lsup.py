@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.kernels.parallelotopes import parallelotope
 from lsu_mesh.model import LSUModel
@@ -58,6 +59,7 @@ class LSUP(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUP"
+    guarantee: ClassVar[Guarantee] = "declared"
     family: ClassVar[int] = filter_step.PARALLELOTOPE
 
     def __init__(

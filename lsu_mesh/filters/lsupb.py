@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.intersection import Intersection
@@ -38,6 +39,7 @@ class LSUPB(CompiledFilter):
     """
 
     kind: ClassVar[str] = "LSUPB"
+    guarantee: ClassVar[Guarantee] = "declared"
     family: ClassVar[int] = filter_step.BUNDLE
 
     def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike]) -> None:

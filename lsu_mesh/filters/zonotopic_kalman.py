@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import hull_gain
@@ -68,6 +68,7 @@ class ZonotopicKalman(Filter):
     """
 
     kind: ClassVar[str] = "ZonotopicKalman"
+    guarantee: ClassVar[Guarantee] = "declared"
     _held: Held
 
     def __init__(

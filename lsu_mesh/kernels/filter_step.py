@@ -52,6 +52,9 @@ def advance(
     second]``. ``PREDICT``: ``A S + B u ⊕ G diag(widths)[−1,1]^q``. What an action does not need is not read. Returns
     0, negative on overflow, or k + 1 where the strip of row (the face of coordinate) k is proved to leave nothing.
     """
+    if action == UPDATE and all_missing(first):
+        copy(S, new)
+        return 0
     n = S.shape[1]
     box_row = 0 if family == BOX else n + 1
     status = 0
@@ -97,6 +100,15 @@ def _advance_box(
     if action == UPDATE:
         return tighten_all(new[0], new[1], P, first, second)
     return shrink(new[0], new[1], first, second)
+
+
+@inlined
+def all_missing(y: Vector) -> bool:
+    """Whether no strip is given: without data nothing changes, also where two sets could tighten each other."""
+    given = 0
+    for i in range(y.size):
+        given += 0 if math.isnan(y[i]) else 1
+    return given == 0
 
 
 @inlined

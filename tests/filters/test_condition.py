@@ -1,4 +1,4 @@
-"""Bayesian transfer into every kind of filter: the truth stays inside, and the bounds never widen."""
+"""Bayesian transfer into every kind of filter, beyond the contract that ``test_contracts.py`` checks."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lsu_mesh import (
     LSUCZ,
@@ -16,13 +14,9 @@ from lsu_mesh import (
     LSUPB,
     ConstrainedZonotope,
     Filter,
-    InconsistentData,
-    Intersection,
     LSUModel,
     Orthotope,
     Parallelotope,
-    Support,
-    Zonotope,
     ZonotopicKalman,
     simulate,
     systems,
@@ -42,8 +36,8 @@ FILTERS: dict[str, Callable[[LSUModel], Filter]] = {
     "ZonotopicKalman": lambda model: ZonotopicKalman(model, PRIOR, order=9),
     "ZonotopicKalman predictor": lambda model: ZonotopicKalman(model, PRIOR, order=9, form="predictor"),
 }
-ROUNDING = {name: 1e-12 if "LSUP " in name else 0.0 for name in FILTERS}
-"""A parallelotope has no room for the rounding of its new edges; all others meet their bounds exactly."""
+EXACT = [name for name in FILTERS if "LSUP " not in name]
+"""Filters that meet their bounds exactly; a parallelotope has no room for the rounding of its new edges."""
 
 
 def prepared(name: str, seed: int) -> tuple[Filter, np.ndarray]:
@@ -57,46 +51,17 @@ def prepared(name: str, seed: int) -> tuple[Filter, np.ndarray]:
     return estimator, made.X[STEPS - 1]
 
 
-def around(x: np.ndarray, shape: str, rng: np.random.Generator) -> Support:
-    """A set of a shape that holds x."""
-    n = x.size
-    half = rng.uniform(0.02, 0.6, n)
-    middle = x + 0.99 * half * rng.uniform(-1.0, 1.0, n)
-    if shape == "orthotope":
-        return Orthotope(middle - half, middle + half)
-    if shape == "parallelotope":
-        T = rng.uniform(-0.4, 0.4, (n, n))
-        return Parallelotope(x + 0.99 * T @ rng.uniform(-1.0, 1.0, n), T)
-    G, xi = rng.uniform(-0.3, 0.3, (n, n + 3)), rng.uniform(-0.9, 0.9, n + 3)
-    if shape == "zonotope":
-        return Zonotope(x - G @ xi, G)
-    A = rng.normal(size=(2, n + 3))
-    body = ConstrainedZonotope(x - G @ xi, np.hstack([G, 1e-9 * np.eye(n)]), np.hstack([A, np.zeros((2, n))]), A @ xi)
-    if shape == "constrained zonotope":
-        return body
-    return Intersection([around(x, "parallelotope", rng), around(x, "orthotope", rng)])
-
-
-@pytest.mark.parametrize("name", FILTERS)
-@pytest.mark.parametrize("shape", ["orthotope", "parallelotope", "zonotope", "constrained zonotope", "intersection"])
-@settings(max_examples=8, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_transfer_never_widens_the_bounds_and_keeps_the_truth(name: str, shape: str, seed: int) -> None:
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("name", EXACT)
+@pytest.mark.parametrize("seed", range(6))
+def test_transfer_never_widens_the_bounds_by_a_single_bit(name: str, seed: int) -> None:
     estimator, x = prepared(name, seed)
+    rng = np.random.default_rng(seed)
     for _ in range(3):
-        other = around(x, shape, rng)
-        if not other.contains(x):
-            continue
         lower, upper = estimator.bounds()
-        rounding = ROUNDING[name] * np.maximum(np.abs(lower), np.abs(upper))
-        assert estimator.condition(other) >= 0.0
-        new_lower, new_upper = estimator.bounds()
-        assert (new_lower >= lower - rounding).all()
-        assert (new_upper <= upper + rounding).all()
-        assert (new_lower <= x).all()
-        assert (x <= new_upper).all()
-        assert estimator.support.contains(x)
+        T = rng.uniform(-0.4, 0.4, (3, 3))
+        estimator.condition(Parallelotope(x + 0.99 * T @ rng.uniform(-1.0, 1.0, 3), T))
+        assert (estimator.bounds()[0] >= lower).all()
+        assert (estimator.bounds()[1] <= upper).all()
 
 
 @pytest.mark.parametrize("name", FILTERS)
@@ -109,16 +74,6 @@ def test_a_second_transfer_of_the_same_set_changes_next_to_nothing(name: str) ->
     again_lower, again_upper = estimator.bounds()
     assert again_lower == pytest.approx(lower, abs=0.05)
     assert again_upper == pytest.approx(upper, abs=0.05)
-
-
-@pytest.mark.parametrize("name", FILTERS)
-def test_a_contradicting_transfer_leaves_the_filter_as_it_was(name: str) -> None:
-    estimator, x = prepared(name, 4)
-    before = estimator.bounds()
-    with pytest.raises(InconsistentData, match="no point in common"):
-        estimator.condition(Orthotope(x + 30.0, x + 31.0))
-    for old, new in zip(before, estimator.bounds(), strict=True):
-        assert (old == new).all()
 
 
 def test_a_parallelotope_whose_hull_a_strip_would_push_out_is_shortened_instead() -> None:

@@ -6,15 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from exact_plant import KINDS, Case, Exact, draw_case, exact_product, exact_steps, inside_box
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from lsu_mesh import LSUCZ, InconsistentData, LSUModel, Orthotope, ZonotopicKalman, systems
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.supports import reduction
 from lsu_mesh.supports.exact import Membership
 from lsu_mesh.supports.linear_programs import Maxima
+from lsu_mesh.testing.exact_plant import Case, Exact, exact_product, exact_steps, inside_box
 
 Maker = Callable[[LSUModel, Orthotope], Filter]
 MAKERS: dict[str, Maker] = {
@@ -59,29 +57,11 @@ def follow(name: str, case: Case, seed: int, steps: int) -> int:
 
 
 @every_filter
-@settings(max_examples=14, deadline=None)
-@given(kind=st.sampled_from(KINDS), seed=st.integers(0, 2**32 - 1))
-def test_exact_states_stay_inside(name: str, kind: str, seed: int) -> None:
-    case = draw_case(np.random.default_rng(seed), kind)
-    assert follow(name, case, seed, steps=6) == 6
-
-
-@every_filter
 @pytest.mark.parametrize("system", systems.SYSTEMS)
 def test_exact_states_stay_inside_on_the_papers_systems(name: str, system: str) -> None:
     model = systems.get(system)
     case = Case(model, Orthotope(-np.ones(model.state_count), np.ones(model.state_count)), inside=False)
     assert follow(name, case, seed=1, steps=10) >= MAX_UNREDUCED_STEPS
-
-
-@pytest.mark.soak
-@every_filter
-def test_hundred_thousand_exact_steps(name: str) -> None:
-    done, seed = 0, 0
-    while done < 100_000:
-        case = draw_case(np.random.default_rng(seed), KINDS[seed % len(KINDS)])
-        done += follow(name, case, seed, steps=20)
-        seed += 1
 
 
 @every_filter

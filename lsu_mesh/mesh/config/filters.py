@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, get_args
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.filters.registry import FILTERS, filter_class
+from lsu_mesh.filters.registry import filter_class, filter_kinds
 from lsu_mesh.mesh.config.expected import Expected, Unfit, choice, known_names
 from lsu_mesh.mesh.config.filter_options import FilterOptions, try_options
 from lsu_mesh.mesh.config.settings import FilterSettings, OnInconsistency, SensorSettings, TransferWay
@@ -38,7 +38,7 @@ def kind_of(table: Table) -> Kind:
     return found if isinstance(found, Kind) else Kind("", None)
 
 
-_KINDS = choice(tuple(FILTERS))
+_KINDS = choice(filter_kinds())
 
 
 def _as_kind(value: Any) -> Kind:

@@ -1,6 +1,7 @@
-"""Which mesh a seed simulates: the configuration as it is, or with other filters, transfers, limits, domain or inputs.
+"""Which mesh a seed simulates: the configuration as it is, or with other transfers, limits, domain or inputs.
 
-Where the seed does not take the mesh as it is, constrained zonotopes are small or replaced: a linear program costs more
+The kinds of filters are those of the configuration, whichever they are. Only constrained zonotopes are made small or
+replaced where the seed does not take the mesh as it is, and the variant's text says so: a linear program costs more
 than all the rest of a step, and the nodes around it are what is tested.
 """
 
@@ -13,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.config.settings import FilterSettings, TransferWay
 from lsu_mesh.supports.orthotope import Orthotope
@@ -22,13 +24,9 @@ RATE = 20.0
 AS_IT_IS = 0.1
 """Share of the runs in which nothing but the rate is changed."""
 MAX_GENERATORS, MAX_CONSTRAINTS = 6, 1
-"""Limits of constrained zonotopes in the other runs."""
-KINDS: Mapping[str, Mapping[str, Any]] = {
-    "LSUO": {},
-    "LSUP": {},
-    "LSUPB": {},
-    "LSUCZ": {"max_generators": MAX_GENERATORS, "max_constraints": MAX_CONSTRAINTS},
-}
+"""Limits of constrained zonotopes in the other runs; at least one generator for each state."""
+IN_ITS_PLACE = ("LSUO", "LSUPB", "LSUCZ")
+"""Guaranteed kinds that a constrained zonotope is drawn from."""
 DOMAIN, INPUTS = 50.0, 6.0
 """Half-widths of a domain and of an input box that are true."""
 
@@ -63,9 +61,7 @@ def draw_variant(rng: random.Random, base: Configuration) -> Variant:
 
 
 def _draw_kind(rng: random.Random, kind: str) -> str:
-    if kind == "LSUCZ":
-        return rng.choice(("LSUO", "LSUPB", "LSUCZ"))
-    return kind if kind in KINDS else "LSUO"
+    return rng.choice(IN_ITS_PLACE) if kind == "LSUCZ" else kind
 
 
 @functools.lru_cache(maxsize=512)
@@ -74,23 +70,31 @@ def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Conf
     base = load(file, (f"mesh.steps={steps}", f"mesh.seed={mesh_seed}", f"mesh.rate={RATE}"))
     if not variant.kinds:
         return base
-    filters = {name: _of_kind(base.filters[name], kind) for name, kind in variant.kinds}
+    small: dict[str, Any] = {
+        "max_generators": max(MAX_GENERATORS, base.base_model.state_count),
+        "max_constraints": MAX_CONSTRAINTS,
+    }
+    filters = {name: _of_kind(base.filters[name], kind, small) for name, kind in variant.kinds}
     name, way = variant.transfer
     if name:
-        senders = base.fusion if way == "fused" else [other for other in filters if other != name]
-        filters[name] = replace(filters[name], transfer=way, transfer_from=tuple(sorted(senders)))
-    fusion = {
-        name: replace(settings, max_generators=MAX_GENERATORS, max_constraints=MAX_CONSTRAINTS)
-        for name, settings in base.fusion.items()
-    }
+        # only sets that are guaranteed: an estimate that misses the truth would accuse a true measurement
+        sound = [
+            other
+            for other, settings in filters.items()
+            if other != name and filter_class(settings.kind).guarantee == "declared"
+        ]
+        senders = base.fusion if way == "fused" else sound
+        if senders:
+            filters[name] = replace(filters[name], transfer=way, transfer_from=tuple(sorted(senders)))
+    fusion = {name: replace(settings, **small) for name, settings in base.fusion.items()}
     return _extended(replace(base, filters=filters, fusion=fusion), variant.extra)
 
 
-def _of_kind(settings: FilterSettings, kind: str) -> FilterSettings:
-    """A filter of another kind, or small where it is a constrained zonotope."""
-    if kind == settings.kind != "LSUCZ":
-        return settings
-    return replace(settings, kind=kind, options=KINDS[kind])
+def _of_kind(settings: FilterSettings, kind: str, small: Mapping[str, Any]) -> FilterSettings:
+    """The filter as it is, with small limits where it is a constrained zonotope, or one of another kind."""
+    if kind != settings.kind:
+        return replace(settings, kind=kind, options={})
+    return replace(settings, options={**settings.options, **small}) if kind == "LSUCZ" else settings
 
 
 def _extended(configuration: Configuration, extra: str) -> Configuration:

@@ -8,11 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lsu_mesh import LSUModel, Orthotope
+from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports.orthotope import Orthotope
 
 Exact = list[Fraction]
 
 KINDS = ("stable", "unstable", "singular", "rank one", "degenerate", "dyadic", "flat prior", "mixed scales")
+"""Ordinary and degenerate models, whose numbers are far from the limits of double precision."""
+EXTREMES = ("one state", "no noise", "huge prior", "no output", "large numbers", "small numbers")
+"""Models at the limits: nothing known before, nothing measured, numbers of 1e150 and of 1e-150."""
+LARGEST, SMALLEST, HUGE = 1e150, 1e-150, 1e9
 
 
 class Case(NamedTuple):
@@ -27,8 +33,8 @@ class Step(NamedTuple):
     """State of the step (exact), the outputs as the filter gets them, the input that drives it on."""
 
     x: Exact
-    y: np.ndarray
-    u: np.ndarray
+    y: Vector
+    u: Vector
 
 
 def draw_case(rng: np.random.Generator, kind: str) -> Case:
@@ -36,8 +42,8 @@ def draw_case(rng: np.random.Generator, kind: str) -> Case:
 
     With mixed scales each state and each output has a unit of its own, 1e-6 … 1e6 of the others'.
     """
-    n, m = int(rng.integers(1, 7)), int(rng.integers(1, 5))
-    scale = 10.0 ** int(rng.integers(-6, 7))
+    n, m = 1 if kind == "one state" else int(rng.integers(1, 7)), int(rng.integers(1, 5))
+    scale = {"large numbers": LARGEST, "small numbers": SMALLEST}.get(kind) or 10.0 ** int(rng.integers(-6, 7))
     if kind == "dyadic":  # everything is representable for some steps, so that r = 0 and rho = 0 can be true
         A = rng.integers(-2, 3, size=(n, n)) / 2.0
         C = rng.integers(-2, 3, size=(m, n)) / 2.0
@@ -53,10 +59,16 @@ def draw_case(rng: np.random.Generator, kind: str) -> Case:
     r = scale * (0.05 + rng.random(m))
     if kind == "degenerate":
         rho, r = rho * rng.choice([0.0, 1e-9, 1.0], size=n), r * 1e-7
+    if kind == "no noise":
+        rho = 0.0 * rho
     center, widths = scale * rng.normal(size=n), scale * (0.1 + rng.random(n))
     if kind == "flat prior":
         widths *= rng.choice([0.0, 1.0], size=n)
+    if kind == "huge prior":
+        widths *= HUGE
     C = rng.normal(size=(m, n))
+    if kind == "no output":
+        C, r = C[:0], r[:0]
     if kind == "mixed scales":
         units, output_units = 10.0 ** rng.uniform(-6, 6, n), 10.0 ** rng.uniform(-6, 6, m)
         A, C = A * units[:, None] / units, C * output_units[:, None] / units
@@ -69,25 +81,32 @@ def draw_case(rng: np.random.Generator, kind: str) -> Case:
 def exact_steps(case: Case, rng: np.random.Generator, steps: int) -> Iterator[Step]:
     """Simulate in rationals from a corner (or the inside) of the prior; outputs end the sequence where none is true."""
     model = case.model
-    N = np.eye(model.state_count) if model.noise_map is None else model.noise_map
-    lower, upper = case.prior.bounds()
-    share = unit_noise(rng, lower.size, case.inside)
-    x = [
-        (Fraction(a) + Fraction(z)) / 2 + (Fraction(z) - Fraction(a)) / 2 * s
-        for a, z, s in zip(lower.tolist(), upper.tolist(), share, strict=True)
-    ]
+    x = start(case, rng)
     for _ in range(steps):
         y = measured(model.C, model.r, x, unit_noise(rng, model.output_count, case.inside))
         u = rng.normal(size=model.input_count)
         yield Step(x, y, u)
-        w = [
-            Fraction(a) * s
-            for a, s in zip(model.rho.tolist(), unit_noise(rng, model.rho.size, case.inside), strict=True)
-        ]
-        parts = [exact_product(model.A, x), exact_product(N, w)]
-        if model.B is not None:
-            parts.append(exact_product(model.B, [Fraction(v) for v in u.tolist()]))
-        x = [sum(entries, Fraction(0)) for entries in zip(*parts, strict=True)]
+        x = next_state(model, x, u, model.rho, unit_noise(rng, model.rho.size, case.inside))
+
+
+def start(case: Case, rng: np.random.Generator) -> Exact:
+    """x_1 at a corner of the prior, or inside it."""
+    lower, upper = case.prior.bounds()
+    share = unit_noise(rng, lower.size, case.inside)
+    return [
+        (Fraction(a) + Fraction(z)) / 2 + (Fraction(z) - Fraction(a)) / 2 * s
+        for a, z, s in zip(lower.tolist(), upper.tolist(), share, strict=True)
+    ]
+
+
+def next_state(model: LSUModel, x: Exact, u: Vector, rho: Vector, noise: Exact) -> Exact:
+    """``A x + B u + N diag(rho) noise``, noise (q,) in [−1, 1], without rounding."""
+    N = np.eye(model.state_count) if model.noise_map is None else model.noise_map
+    w = [Fraction(a) * s for a, s in zip(rho.tolist(), noise, strict=True)]
+    parts = [exact_product(model.A, x), exact_product(N, w)]
+    if model.B is not None:
+        parts.append(exact_product(model.B, [Fraction(v) for v in u.tolist()]))
+    return [sum(entries, Fraction(0)) for entries in zip(*parts, strict=True)]
 
 
 def unit_noise(rng: np.random.Generator, size: int, inside: bool) -> Exact:
@@ -97,12 +116,12 @@ def unit_noise(rng: np.random.Generator, size: int, inside: bool) -> Exact:
     return [Fraction(int(v)) for v in rng.choice([-1, 1], size)]
 
 
-def exact_product(M: np.ndarray, x: Exact) -> Exact:
+def exact_product(M: Matrix, x: Exact) -> Exact:
     """``M x`` without rounding."""
     return [sum((Fraction(a) * v for a, v in zip(row, x, strict=True)), Fraction(0)) for row in M.tolist()]
 
 
-def measured(C: np.ndarray, r: np.ndarray, x: Exact, noise: Exact) -> np.ndarray:
+def measured(C: Matrix, r: Vector, x: Exact, noise: Exact) -> Vector:
     """Outputs as doubles that keep ``|y − C x| ≤ r`` exactly; NaN (missing) where r is too small for any double."""
     y = np.empty(len(r))
     for i, (output, width, unit) in enumerate(zip(exact_product(C, x), r.tolist(), noise, strict=True)):
@@ -115,6 +134,6 @@ def measured(C: np.ndarray, r: np.ndarray, x: Exact, noise: Exact) -> np.ndarray
     return y
 
 
-def inside_box(lower: np.ndarray, upper: np.ndarray, x: Exact) -> bool:
+def inside_box(lower: Vector, upper: Vector, x: Exact) -> bool:
     """Whether the exact point lies in the box; no tolerance."""
     return all(Fraction(a) <= v <= Fraction(z) for a, v, z in zip(lower.tolist(), x, upper.tolist(), strict=True))
