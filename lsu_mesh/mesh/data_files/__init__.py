@@ -1,0 +1,8 @@
+"""Files of recorded data: CSV, Parquet and NumPy, read exactly, refused in plain words, and accounted for row by row."""
+
+from lsu_mesh.mesh.data_files.data_file import DataFile
+from lsu_mesh.mesh.data_files.problems import DataFileError
+from lsu_mesh.mesh.data_files.read import look, read
+from lsu_mesh.mesh.data_files.settings import DataFileSettings
+
+__all__ = ["DataFile", "DataFileError", "DataFileSettings", "look", "read"]
