@@ -70,7 +70,8 @@ class Grid:
         whole, rest = np.divmod(k, q)
         part, over = np.divmod(rest * p, q)
         up = (2 * over > q) | ((2 * over == q) & ((whole * p + part) % 2 == 1))
-        return self.start_ns + whole * p + part + up
+        times: Int = self.start_ns + whole * p + part + up
+        return times
 
     def steps_of(self, t_ns: Int) -> Int:
         """:meth:`step_of` of an array."""
@@ -81,16 +82,19 @@ class Grid:
         # since = a p + b with 0 ≤ b < p, so ceil(since q / p) = a q + ceil(b q / p)
         a, b = np.divmod(t_ns - self.start_ns, p)
         k: Int = a * q - (-b * q) // p
-        return k - (self.times_of(k - 1) >= t_ns)
+        k -= self.times_of(k - 1) >= t_ns
+        return k
 
     def nearest_steps(self, t_ns: Int) -> Int:
         """:meth:`nearest_step` of an array."""
         k = self.steps_of(t_ns)
-        return k - (t_ns - self.times_of(k - 1) <= self.times_of(k) - t_ns)
+        nearest: Int = k - (t_ns - self.times_of(k - 1) <= self.times_of(k) - t_ns)
+        return nearest
 
     def distances(self, t_ns: Int) -> Int:
         """:meth:`distance` of an array."""
-        return np.abs(t_ns - self.times_of(self.nearest_steps(t_ns)))
+        distances: Int = np.abs(t_ns - self.times_of(self.nearest_steps(t_ns)))
+        return distances
 
     def _fits(self, k: Int, p: int, q: int) -> bool:
         """Whether all numbers of :meth:`times_of` stay below 2⁶³."""

@@ -1,4 +1,4 @@
-"""Files of recorded data: CSV, Parquet and NumPy, read exactly, refused in plain words, and accounted for row by row."""
+"""Files of recorded data: CSV, Parquet and NumPy, read exactly, refused in plain words, every row accounted for."""
 
 from lsu_mesh.mesh.data_files.data_file import DataFile
 from lsu_mesh.mesh.data_files.problems import DataFileError

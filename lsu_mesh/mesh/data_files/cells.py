@@ -17,6 +17,7 @@ from lsu_mesh.mesh.data_files.settings import DataFileSettings
 Bytes = NDArray[np.bytes_]
 Int = NDArray[np.int64]
 Raw = NDArray[np.uint8]
+Mask = NDArray[np.bool_]
 MAX_CELL = 80
 """A longer cell is no number and no time; it is cut to one byte more."""
 _BLOCK = 8192
@@ -35,7 +36,9 @@ class Cells:
     """The last line has no line end, so that it may be cut off."""
 
 
-def split_rows(data: bytes, layout: Layout, names: Sequence[str], settings: DataFileSettings, problems: FileProblems) -> Cells:  # fmt: skip
+def split_rows(
+    data: bytes, layout: Layout, names: Sequence[str], settings: DataFileSettings, problems: FileProblems
+) -> Cells:
     """The cells of the named columns. Rows that are wider or shorter than the header are recorded in ``problems``."""
     body = data[layout.body :]
     open_end = bool(body) and not body.endswith(b"\n")
@@ -60,10 +63,10 @@ def _regular(text: bytes, layout: Layout, at: Sequence[int], comment: str) -> tu
         if unquoted is None:
             return None
         data = unquoted
-    ends = np.flatnonzero((data == delimiter[0]) | (data == _NEWLINE))
-    if not len(ends) or len(ends) % count:
+    separators = np.flatnonzero((data == delimiter[0]) | (data == _NEWLINE))
+    if not len(separators) or len(separators) % count:
         return None
-    ends = ends.reshape(-1, count)
+    ends = separators.reshape(-1, count)
     is_newline = data[ends] == _NEWLINE
     if not is_newline[:, -1].all() or is_newline[:, :-1].any():
         return None
@@ -107,7 +110,15 @@ def _cut(data: Raw, starts: Int, ends: Int) -> Bytes:
         rows = slice(first, first + _BLOCK)
         np.multiply(windows[starts[rows]], offsets < lengths[rows, None], out=cut[rows])
     cells: Bytes = cut.view(f"S{width}").ravel()
-    return np.strings.strip(cells) if ((cut == 32) | (cut == 9)).any() else cells
+    if not ((cut == 32) | (cut == 9)).any():
+        return cells
+    is_cut = lengths > MAX_CELL  # keeps its blanks: it must stay too long
+    return np.where(is_cut, cells, np.strings.strip(cells))
+
+
+def is_too_long(cells: Bytes) -> Mask:
+    """Which cells were cut, so that nothing may be read from them."""
+    return np.strings.str_len(cells) > MAX_CELL
 
 
 def _irregular(
@@ -130,7 +141,7 @@ def _irregular(
             else:
                 _wrong_width(row, source.line, layout, problems, is_cut=open_end and source.line == last)
     except csv.Error as error:
-        problems.add("quotes", f"line {source.line}", f"the quotes of a cell are wrong: {error}")
+        problems.add("quotes", f"line {source.line}", f"a quote is not closed, or stands inside a cell: {error}")
     columns = [_column([row[i] for row in rows]) for i in at]
     return columns, np.array(lines, dtype=np.int64), blank
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.mesh.data_files.cells import Bytes
+from lsu_mesh.mesh.data_files.cells import MAX_CELL, Bytes
 from lsu_mesh.mesh.data_files.numbers import bytes_of
 from lsu_mesh.mesh.data_files.settings import TIME_UNITS
 
@@ -55,7 +55,7 @@ class Decimals:
 
     def _read_long(self, i: int, cell: bytes) -> None:
         match = _NUMBER.fullmatch(cell)
-        if match is None or not match[2] + match[3]:
+        if match is None or not match[2] + match[3] or len(cell) > MAX_CELL:
             return
         exponent = int(match[4] or 0)
         self.is_number[i] = True
@@ -93,14 +93,16 @@ class Decimals:
     def digit_ns(self, unit_ns: int) -> int:
         """A unit of the last digit of the number with the most decimals, at least 1 ns."""
         places = int(self.places.max(initial=0))
-        return max(1, unit_ns // 10 ** min(places, _MAX_DIGITS))
+        divisor: int = 10 ** min(places, _MAX_DIGITS)
+        return max(1, unit_ns // divisor)
 
 
 def _divided(mantissa: Int, divisor: int) -> Int:
     """``mantissa / divisor`` rounded, halves to the even one."""
     whole, rest = np.divmod(mantissa, divisor)
     up = (rest > divisor // 2) | ((rest == divisor // 2) & (whole % 2 == 1))  # the divisor is even
-    return whole + up
+    rounded: Int = whole + up
+    return rounded
 
 
 def unit_by_size(smallest: float, largest: float) -> str | None:

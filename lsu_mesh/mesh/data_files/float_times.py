@@ -46,4 +46,5 @@ def half_spacing_ns(values: NDArray[np.floating], unit_ns: int) -> Int:
     A moment t (whole ns) whose nearest float is the given one lies no further from the rounded time.
     """
     half = np.spacing(np.abs(values)).astype(np.float64) * 0.5 * unit_ns
-    return np.floor(half + 0.5).astype(np.int64)
+    whole: Int = np.floor(half + 0.5).astype(np.int64)
+    return whole

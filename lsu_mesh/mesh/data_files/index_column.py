@@ -43,7 +43,7 @@ def text_times(cells: Bytes, name: str, lines: Int, settings: DataFileSettings, 
 
 def _iso(cells: Bytes, name: str, lines: Int, problems: FileProblems) -> Times:
     times = IsoTimes(cells)
-    _refuse(~times.is_time, cells, name, lines, problems, "an ISO 8601 time as in the rows above")
+    _refuse(~times.is_time, cells, name, lines, problems, "an ISO 8601 time of a day that exists")
     zones = times.has_zone[times.is_time]
     if zones.any() and not zones.all():
         i = int(np.flatnonzero(times.is_time & (times.has_zone != times.has_zone[0]))[0])
@@ -80,7 +80,7 @@ def find_unit(
             'nor seconds from a start; say which: time_unit = "s", "ms", "us" or "ns"'
         )
         problems.add("unit", f"column {name!r}", text)
-        return TIME_UNITS["s"]
+        return TIME_UNITS["ns"]
     if unit != "s":
         notes.append(f'times of {name!r} are read as {unit} since 1970, by their size; time_unit = "{unit}" says so')
     return TIME_UNITS[unit]

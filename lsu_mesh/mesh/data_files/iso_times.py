@@ -7,7 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.mesh.data_files.cells import Bytes
+from lsu_mesh.mesh.data_files.cells import MAX_CELL, Bytes
 from lsu_mesh.mesh.data_files.numbers import bytes_of
 
 Int = NDArray[np.int64]
@@ -54,7 +54,7 @@ class IsoTimes:
     def _read(self, characters: NDArray[np.uint8], rows: Int, shape: bytes) -> None:
         """The texts of one shape: every part stands in the same columns of all of them."""
         match = _TIME.fullmatch(shape)
-        if match is None:
+        if match is None or len(shape) > MAX_CELL:
             return
 
         def part(name: str) -> Int:

@@ -43,4 +43,4 @@ def _has_fewer_decimals(last: bytes, others: Bytes, decimal: bytes) -> bool:
     decimals = np.where(np.strings.find(others, decimal) < 0, 0, decimals)
     if lengths.min() == 0 or decimals.min() != decimals.max() or decimals[0] == 0:
         return bool(not last and lengths.min() > 0)
-    return (len(last) - 1 - last.find(b".") if b"." in last else 0) < decimals[0]
+    return (len(last) - 1 - last.find(b".") if b"." in last else 0) < int(decimals[0])

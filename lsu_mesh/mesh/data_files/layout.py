@@ -66,9 +66,9 @@ def find_layout(data: bytes, settings: DataFileSettings, problems: FileProblems)
     lines = _head_lines(data, settings.comment)
     if not lines:
         raise problems.fail("holds no rows below the header" if data.strip() else "is empty")
-    delimiters = DELIMITERS if settings.delimiter is None else (settings.delimiter,)
+    delimiters: tuple[str, ...] = DELIMITERS if settings.delimiter is None else (settings.delimiter,)
     if settings.delimiter is None and settings.decimal == ",":
-        delimiters = DELIMITERS[1:]
+        delimiters = (*DELIMITERS[1:], ",")
     for number, start, text in lines:
         for delimiter in delimiters:
             names = _cells(text, delimiter)

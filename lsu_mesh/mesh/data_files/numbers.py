@@ -7,7 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.mesh.data_files.cells import MAX_CELL, Bytes
+from lsu_mesh.mesh.data_files.cells import MAX_CELL, Bytes, is_too_long
 from lsu_mesh.mesh.data_files.problems import FileProblems, cell_place, shown
 from lsu_mesh.mesh.data_files.settings import DataFileSettings
 
@@ -32,6 +32,7 @@ def with_point(cells: Bytes, name: str, lines: Int, settings: DataFileSettings, 
         i = int(np.argmax(pointed))
         text = f'{shown(cells[i])} has a point, but decimal = ","; write numbers in one way, without thousands'
         problems.add("point", cell_place(int(lines[i]), name), text, count=int(pointed.sum()))
+        cells = np.where(pointed, b"0", cells)  # one mistake is enough
     return np.strings.replace(cells, b",", b".")
 
 
@@ -59,7 +60,8 @@ def missing_cells(cells: Bytes, settings: DataFileSettings) -> Mask:
 
 
 def _is_digit(characters: NDArray[np.uint8]) -> Mask:
-    return (characters >= ord("0")) & (characters <= ord("9"))
+    is_digit: Mask = (characters >= ord("0")) & (characters <= ord("9"))
+    return is_digit
 
 
 def read_numbers(cells: Bytes, name: str, lines: Int, settings: DataFileSettings, problems: FileProblems) -> Float:
@@ -78,7 +80,8 @@ def read_numbers(cells: Bytes, name: str, lines: Int, settings: DataFileSettings
 
 
 def _is_sign(characters: NDArray[np.uint8]) -> Mask:
-    return (characters == ord("-")) | (characters == ord("+")) | (characters == ord("."))
+    is_sign: Mask = (characters == ord("-")) | (characters == ord("+")) | (characters == ord("."))
+    return is_sign
 
 
 def _converted(cells: Bytes, asked: Mask) -> tuple[Float, Mask]:
@@ -94,6 +97,8 @@ def _converted(cells: Bytes, asked: Mask) -> tuple[Float, Mask]:
     odd = characters > ord("9")
     if odd.any():
         wrong = asked & (odd & ((characters | 32) != ord("e"))).any(axis=1)
+    if characters.shape[1] > MAX_CELL:
+        wrong |= asked & is_too_long(cells)
     try:
         if asked.all() and not wrong.any():
             return cells.astype(np.float64), wrong

@@ -97,7 +97,8 @@ class NumpyFile:
             with self._open(name) as file:
                 return np.lib.format.read_array(file, allow_pickle=False)
 
-        return self._guarded(load)
+        array: NDArray[Any] = self._guarded(load)
+        return array
 
     def _typed(self, name: str, array: NDArray[Any]) -> TypedColumn:
         kind = array.dtype.kind

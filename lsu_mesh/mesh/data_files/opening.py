@@ -63,7 +63,7 @@ def kind_of(path: Path, max_bytes: int, problems: FileProblems) -> FileKind:
             raise problems.fail(f"is {words}")
     if head.startswith(b"PAR1"):
         return FileKind.PARQUET
-    if head.startswith(b"PK\x03\x04") or head.startswith(b"PK\x05\x06"):
+    if head.startswith((b"PK\x03\x04", b"PK\x05\x06")):
         return FileKind.NPZ
     return FileKind.NPY if head.startswith(b"\x93NUMPY") else FileKind.TEXT
 

@@ -47,6 +47,7 @@ def read(settings: DataFileSettings, count: int | None = None) -> DataFile:
     found = (
         _read_text(settings, count, problems) if kind is FileKind.TEXT else _read_typed(settings, kind, count, problems)
     )
+    problems.raise_if_any()
     if not found.row_count:
         problems.add("empty", "", "holds no rows below the header" if kind is FileKind.TEXT else "holds no rows")
     problems.raise_if_any()
