@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.mesh.data_files.data_file import DataFile
 from lsu_mesh.mesh.data_files.spans import duration_text, moment_text
-from lsu_mesh.mesh.data_files.unplayable import period_doubt, why_unplayable
+from lsu_mesh.mesh.data_files.unplayable import has_other_epoch, late_doubt, period_doubt, why_unplayable
 from lsu_mesh.mesh.grid import Grid
 
 Int = NDArray[np.int64]
@@ -96,7 +96,7 @@ class Account:
     by_time: bool
     notes: tuple[str, ...]
     error: str | None
-    """Why nothing can be played, and the remedy."""
+    """Why nothing can be played, or should not be, and the remedy."""
     doubts: tuple[str, ...]
 
     @property
@@ -168,7 +168,8 @@ def account(
         duplicates=int((gaps == 0).sum()), out_of_order=data.out_of_order, span=_span(data), period=_period(data, gaps),
         largest_distance_ns=int(placed.distance_ns[delivered].max(initial=0)),
         off_grid=int((off_grid & delivered).sum()), by_time=data.time_ns is not None, notes=data.notes,
-        error=None if delivered.any() else why_unplayable(data, grid, last_step), doubts=period_doubt(data, grid, gaps),
+        error=why_unplayable(data, grid, last_step) if not delivered.any() or has_other_epoch(data, grid) else None,
+        doubts=(*period_doubt(data, grid, gaps), *late_doubt(data, grid, used)),
     )  # fmt: skip
 
 

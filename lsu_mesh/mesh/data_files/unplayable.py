@@ -12,8 +12,15 @@ from lsu_mesh.mesh.grid import Grid
 
 NS = 10**9
 _FACTORS = ((10**3, "ms"), (10**6, "us"), (10**9, "ns"))
+LONG_BEFORE = 1000
+"""Steps without a row before the first one that are no surprise."""
 _NEARLY = 0.2
 """A period within 20 % of 1000 dt looks like milliseconds."""
+
+
+def has_other_epoch(data: DataFile, grid: Grid) -> bool:
+    """Whether the times count from 1970 and start_time does not: thousands of millions of empty steps would come."""
+    return data.time_ns is not None and int(data.time_ns[0]) >= EARLIEST_S * NS > abs(grid.start_ns)
 
 
 def why_unplayable(data: DataFile, grid: Grid, last_step: int | None) -> str:
@@ -23,7 +30,7 @@ def why_unplayable(data: DataFile, grid: Grid, last_step: int | None) -> str:
     first, last = int(data.time_ns[0]), int(data.time_ns[-1])
     remedy = f"the first row would be step 1 with start_time = {proposed_start(first, grid)}"
     where = f"its rows are from {moment_text(first)} to {moment_text(last)}"
-    if first >= EARLIEST_S * NS > abs(grid.start_ns):
+    if has_other_epoch(data, grid):
         return f"no row is played: its times count from 1970, start_time does not; {remedy}"
     if grid.start_ns >= EARLIEST_S * NS > abs(last):
         return f"no row is played: start_time counts from 1970, its times do not ({where}); {remedy}"
@@ -48,6 +55,14 @@ def proposed_start(first_ns: int, grid: Grid) -> str:
         return moment_text(start)
     text = seconds_text(start)
     return text if "." in text else f"{text}.0"
+
+
+def late_doubt(data: DataFile, grid: Grid, used: NDArray[np.int64]) -> tuple[str, ...]:
+    """A first row far inside the run: start_time is probably not that of the file."""
+    if data.time_ns is None or not len(used) or used[0] <= max(LONG_BEFORE, 10 * data.row_count):
+        return ()
+    start = proposed_start(int(data.time_ns[0]), grid)
+    return (f"the first row is step {used[0]}; start_time = {start} makes it step 1",)
 
 
 def period_doubt(data: DataFile, grid: Grid, gaps: NDArray[np.int64]) -> tuple[str, ...]:
