@@ -18,11 +18,16 @@ class Experiment(NamedTuple):
 REPRODUCIBLE = {
     "p2006": Experiment("half-widths by linear programming, off-line and on a sliding window", ("p2006.experiment",)),
     "p2014": Experiment(
-        "states, E, F and half-widths on a window; centred points, vertices, truncated Kalman filter", ("p2014.experiment",)
+        "states, E, F and half-widths on a window; centred points, vertices, truncated Kalman filter",
+        ("p2014.experiment",),
     ),
     "p2018": Experiment("LSUO beside the zonotopic Kalman filter on P3: Table 1, Figures 1–3", ("p2018.experiment",)),
-    "l2019": Experiment("LSUO and LSUP on S1, S2, S3 over a grid of noises: 16 criteria, 26 figures", ("l2019.experiment",)),
-    "p2023": Experiment("LSUCZ beside LSUO and LSUP over the observation noise: Tables 1, 2, Figures 1–3", ("p2023.experiment",)),
+    "l2019": Experiment(
+        "LSUO and LSUP on S1, S2, S3 over a grid of noises: 16 criteria, 26 figures", ("l2019.experiment",)
+    ),
+    "p2023": Experiment(
+        "LSUCZ beside LSUO and LSUP over the observation noise: Tables 1, 2, Figures 1–3", ("p2023.experiment",)
+    ),
     "fusion": Experiment(
         "three filters and their fusion on P3; Bayesian transfer against the source's noise", ("fusion", "transfer")
     ),
