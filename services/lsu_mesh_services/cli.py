@@ -15,6 +15,7 @@ from lsu_mesh_services.options import (
     health,
     identify,
     keys,
+    new,
     peer,
     recording,
     replay,
@@ -31,6 +32,7 @@ from lsu_mesh_services.stop import Stop, leave
 GROUPS = (
     run,
     peer,
+    new,
     validate,
     doctor,
     graph,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.mesh.data_files import DataFile, DataFileError, DataFileSettings, look, read
+from lsu_mesh.mesh.data_files import DataFileError, look, read
 from lsu_mesh.mesh.data_files.account import Account, account, place
 from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
 from lsu_mesh.mesh.grid import Grid
@@ -46,7 +46,7 @@ def read_columns(settings: MeasurementFileSettings, default_count: int) -> Colum
     Without named columns all but the index column are taken, if they are ``default_count``.
     Raises :class:`FileProblems`.
     """
-    return Columns(look(_data_file_settings(settings), default_count))
+    return Columns(look(settings, default_count))
 
 
 def read_playback(settings: MeasurementFileSettings, dt: object, start_time: object) -> Playback:
@@ -55,7 +55,7 @@ def read_playback(settings: MeasurementFileSettings, dt: object, start_time: obj
     The first row of a step counts.
     Rows before step 1 are left out. Raises :class:`FileProblems`.
     """
-    data = _read(settings)
+    data = read(settings)
     placed = place(data, grid_of(dt, start_time))
     order = np.flatnonzero(placed.is_delivered)
     order = order[np.argsort(placed.steps[order], kind="stable")]
@@ -81,7 +81,7 @@ def accounts(configuration: Configuration) -> dict[str, Account]:
         if settings is None:
             continue
         try:
-            found[table] = account(_read(settings), grid, mesh.steps)
+            found[table] = account(read(settings), grid, mesh.steps)
         except FileProblems as error:
             lines += error.lines
             continue
@@ -90,11 +90,3 @@ def accounts(configuration: Configuration) -> dict[str, Account]:
     if lines:
         raise FileProblems(lines)
     return found
-
-
-def _read(settings: MeasurementFileSettings) -> DataFile:
-    return read(_data_file_settings(settings))
-
-
-def _data_file_settings(settings: MeasurementFileSettings) -> DataFileSettings:
-    return DataFileSettings(settings.path, settings.columns, settings.index, settings.indexed_by)

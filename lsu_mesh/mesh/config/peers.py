@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.registry import FILTERS, filter_class
+from lsu_mesh.mesh.config.data_file_keys import KEYS, read_file_format
 from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
 from lsu_mesh.mesh.config.settings import (
     FilterSettings,
@@ -105,8 +107,9 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
     text = table.text("file", None)
     columns = table.texts("columns", None)
     by_time, by_step = table.text("time", None), table.text("step", None)
+    file_format = read_file_format(table)
     if text is None:
-        for key in ("columns", "time", "step"):
+        for key in ("columns", "time", "step", *KEYS):
             if key in table.values:
                 table.wrong(key, "has no effect without file = the path of a CSV file")
         return None
@@ -117,7 +120,7 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
         table.wrong("columns", f"expected {count} column names, one per {per}, found {len(columns)}")
         columns = None
     path = file_at(text, folder)
-    settings = MeasurementFileSettings(path, tuple(columns or ()), index, indexed_by)
+    settings = MeasurementFileSettings(path, tuple(columns or ()), index, indexed_by, **file_format)
     if not table.problems.reads_files:
         return settings
     try:
@@ -125,7 +128,7 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
     except FileProblems as error:
         table.problems.lines.extend(error.lines)
         return settings
-    return MeasurementFileSettings(path, header, index, indexed_by)
+    return replace(settings, columns=header)
 
 
 def read_filter(

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from lsu_mesh.mesh.data_files.data_file import DataFile
 from lsu_mesh.mesh.data_files.spans import duration_text, moment_text
-from lsu_mesh.mesh.data_files.unplayable import has_other_epoch, late_doubt, period_doubt, why_unplayable
+from lsu_mesh.mesh.data_files.unplayable import (
+    has_other_epoch,
+    late_doubt,
+    off_grid_doubt,
+    period_doubt,
+    why_unplayable,
+)
 from lsu_mesh.mesh.grid import Grid
 
 Int = NDArray[np.int64]
@@ -169,7 +175,11 @@ def account(
         largest_distance_ns=int(placed.distance_ns[delivered].max(initial=0)),
         off_grid=int((off_grid & delivered).sum()), by_time=data.time_ns is not None, notes=data.notes,
         error=why_unplayable(data, grid, last_step) if not delivered.any() or has_other_epoch(data, grid) else None,
-        doubts=(*period_doubt(data, grid, gaps), *late_doubt(data, grid, used)),
+        doubts=(
+            *off_grid_doubt(placed.distance_ns[off_grid & delivered], nearest),
+            *period_doubt(data, grid, gaps),
+            *late_doubt(data, grid, used),
+        ),
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import difflib
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -75,6 +76,17 @@ def find_layout(data: bytes, settings: DataFileSettings, problems: FileProblems)
             if set(settings.wanted) <= set(names) and (settings.columns or len(names) > 1):
                 return _layout(data, (number, start, text), names, delimiter, lines, settings, problems)
     raise _no_header(data, lines[0], delimiters, settings, problems)
+
+
+def guess_names(data: bytes, settings: DataFileSettings, problems: FileProblems) -> tuple[str, ...]:
+    """The cells of the first line that has as many as the line below it, at least two, and no number among them."""
+    lines = [text for _, _, text in _head_lines(data, settings.comment)]
+    for above, below in itertools.pairwise(lines):
+        for delimiter in DELIMITERS:
+            names = _cells(above, delimiter)
+            if 1 < len(names) == len(_cells(below, delimiter)) and not any(_is_numeric(name) for name in names):
+                return tuple(names)
+    raise problems.fail("no line looks like a header: names of columns, with as many cells as the rows below it")
 
 
 def _layout(

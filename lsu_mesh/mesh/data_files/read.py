@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from lsu_mesh.mesh.data_files.cells import split_rows
 from lsu_mesh.mesh.data_files.data_file import DataFile, Float, Int
 from lsu_mesh.mesh.data_files.index_column import Times, text_times
 from lsu_mesh.mesh.data_files.last_line import check_last_line
-from lsu_mesh.mesh.data_files.layout import check_text, find_layout
+from lsu_mesh.mesh.data_files.layout import check_text, find_layout, guess_names
 from lsu_mesh.mesh.data_files.numbers import read_numbers, read_steps
 from lsu_mesh.mesh.data_files.numpy_files import NumpyFile
 from lsu_mesh.mesh.data_files.opening import HEAD_BYTES, FileKind, kind_of, read_bytes
@@ -38,6 +39,17 @@ def look(settings: DataFileSettings, count: int | None = None) -> tuple[str, ...
     else:
         names = _typed_file(settings, kind, problems).names
     return _value_columns(names, settings, count, place, problems)
+
+
+def columns_of(path: Path) -> tuple[str, ...]:
+    """All names of a file's header, whatever they are. Raises :class:`DataFileError`."""
+    settings = DataFileSettings(path, (), "", "time")
+    problems = FileProblems(path)
+    kind = kind_of(path, settings.max_bytes, problems)
+    if kind is not FileKind.TEXT:
+        return _typed_file(settings, kind, problems).names
+    head = read_bytes(path, HEAD_BYTES, problems)
+    return guess_names(check_text(head, problems, whole=len(head) < HEAD_BYTES), settings, problems)
 
 
 def read(settings: DataFileSettings, count: int | None = None) -> DataFile:

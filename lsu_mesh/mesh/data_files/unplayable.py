@@ -57,6 +57,14 @@ def proposed_start(first_ns: int, grid: Grid) -> str:
     return text if "." in text else f"{text}.0"
 
 
+def off_grid_doubt(distances_ns: NDArray[np.int64], nearest: bool) -> tuple[str, ...]:
+    """Rows that are taken as measured at another moment than their own."""
+    if not nearest or not len(distances_ns):
+        return ()
+    far = duration_text(int(distances_ns.max()))
+    return (f"rows lie off the grid ({len(distances_ns)}, by up to {far}) and are taken as measured at their step",)
+
+
 def late_doubt(data: DataFile, grid: Grid, used: NDArray[np.int64]) -> tuple[str, ...]:
     """A first row far inside the run: start_time is probably not that of the file."""
     if data.time_ns is None or not len(used) or used[0] <= max(LONG_BEFORE, 10 * data.row_count):
