@@ -19,3 +19,9 @@ Counts = NDArray[np.int64]
 """How often."""
 Flags = NDArray[np.bool_]
 """Yes or no, one an entry."""
+Integers = NDArray[np.int64]
+"""Whole numbers, such as times in nanoseconds."""
+CellTexts = NDArray[np.bytes_]
+"""Texts of equal length."""
+RawBytes = NDArray[np.uint8]
+"""The bytes of a file."""

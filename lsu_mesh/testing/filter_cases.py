@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
@@ -19,7 +20,6 @@ from lsu_mesh.testing.exact_plant import (
     KINDS,
     Case,
     Exact,
-    Vector,
     draw_case,
     inside_box,
     measured,

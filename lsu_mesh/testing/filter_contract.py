@@ -7,13 +7,14 @@ from fractions import Fraction
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.testing.estimate_contract import check_estimates
-from lsu_mesh.testing.exact_plant import Exact, Vector, exact_product, inside_box
+from lsu_mesh.testing.exact_plant import Exact, exact_product, inside_box
 from lsu_mesh.testing.filter_cases import SHAPES, Moment, Problem, around, common_points, draw_problem
 from lsu_mesh.testing.filter_limits import check_limits
 from lsu_mesh.testing.filter_state import ROUNDING, Witness

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
-from lsu_mesh.testing.exact_plant import Vector
 from lsu_mesh.testing.membership import hull_of_parts, numbers_of
 
 State = tuple[object, ...]

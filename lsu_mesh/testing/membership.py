@@ -6,12 +6,13 @@ from fractions import Fraction
 
 import numpy as np
 
+from lsu_mesh.array_types import Vector
 from lsu_mesh.supports.exact import Membership, parallelotope_membership
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
-from lsu_mesh.testing.exact_plant import Exact, Vector, inside_box
+from lsu_mesh.testing.exact_plant import Exact, inside_box
 
 
 def is_outside(support: Support, x: Exact, *, decided: bool = True) -> bool:

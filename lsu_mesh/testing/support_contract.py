@@ -8,10 +8,11 @@ from fractions import Fraction
 
 import numpy as np
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
-from lsu_mesh.testing.exact_plant import Exact, Matrix, Vector, exact_product, inside_box
+from lsu_mesh.testing.exact_plant import Exact, exact_product, inside_box
 from lsu_mesh.testing.filter_cases import SHAPES, around
 from lsu_mesh.testing.membership import exceeds, is_outside, numbers_of
 from lsu_mesh.testing.support_samples import Draw, Sample, draw_for

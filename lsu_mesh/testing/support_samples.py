@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
-from lsu_mesh.testing.exact_plant import Exact, Matrix, Vector
+from lsu_mesh.testing.exact_plant import Exact
 from lsu_mesh.testing.filter_cases import box_around
 from lsu_mesh.testing.membership import is_outside
 

@@ -17,6 +17,7 @@ from lsu_mesh_services.options import (
     health,
     identify,
     keys,
+    new,
     peer,
     recording,
     replay,
@@ -33,6 +34,7 @@ from lsu_mesh_services.stop import Stop, leave
 GROUPS = (
     run,
     peer,
+    new,
     validate,
     doctor,
     graph,

@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Protocol
 
 from lsu_mesh.mesh.config import Configuration
-from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.configuration import DEMO, flags
-from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
+from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
 from lsu_mesh_services.monitoring.run_report import RunReport
 from lsu_mesh_services.monitoring.table import Progress, print_json, print_table
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.network.security import certificates, check_endpoints
+from lsu_mesh_services.played_files import accounts_or_explain, last_step
 from lsu_mesh_services.session import any_port, with_session
 from lsu_mesh_services.stop import Stop
 from lsu_mesh_services.supervisor import Supervisor
@@ -67,6 +67,8 @@ class Run:
     recording: Path | None
     player: Player | None = None
     """Publishes what plant and sensors published in a recording, in their place."""
+    last: int | None = None
+    """The last step of the run; None: until stopped."""
     viewer: Viewer | None = None
     alive: set[str] = field(default_factory=set)
     happened: list[str] = field(default_factory=list)
@@ -110,10 +112,16 @@ class Run:
 
 def run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None = None) -> int:
     """Run the mesh of a configuration, with a recording in the place of its sources where there is one."""
-    return with_session("run", lambda: _run_mesh(configuration, options, player))
+    played = accounts_or_explain(configuration)
+    if played is None:
+        return USAGE
+    last = last_step(configuration, played)
+    return with_session("run", lambda: _run_mesh(configuration, options, player, last))
 
 
-def _run_mesh(configuration: Configuration, options: argparse.Namespace, player: Player | None) -> int:
+def _run_mesh(
+    configuration: Configuration, options: argparse.Namespace, player: Player | None, last: int | None
+) -> int:
     stop: Stop = options.stop
     clock = Clock()
     settings = _session_settings(configuration, options)
@@ -131,6 +139,7 @@ def _run_mesh(configuration: Configuration, options: argparse.Namespace, player:
             report=report,
             recording=recording,
             player=player,
+            last=last,
         )
         return _supervise(run)
 
@@ -190,7 +199,7 @@ def _viewer(run: Run) -> Viewer | None:
 
 def _announce(run: Run) -> None:
     mesh = run.configuration.mesh
-    last = _last_step(run.configuration)
+    last = run.last
     length = "until stopped" if last is None else f"{last} steps"
     where = "not recorded" if run.recording is None else f"recorded in {run.recording}"
     played = 0 if run.player is None else sum(role in ("plant", "sensor") for role, _ in run.configuration.peers())
@@ -240,7 +249,7 @@ def _arguments(run: Run, role: str) -> list[str]:
     """What a child is started with: the configuration of this run."""
     file = run.options.file if run.options.file is not None else str(DEMO)
     arguments = ["-c", file, "-e", run.configuration.network.entry, "-l", any_port(run.configuration)]
-    last = _last_step(run.configuration)
+    last = run.last
     end = [] if last is None else [f"mesh.steps={last}"]
     for override in [*flags(run.options), *run.options.overrides, *end]:
         arguments += ["-X", override]
@@ -276,7 +285,7 @@ def _await_mesh(run: Run, names: set[str]) -> bool:
 
 def _follow(run: Run) -> None:
     """Until the last step has been reached everywhere, the sources have ended, or someone says stop."""
-    last = _last_step(run.configuration)
+    last = run.last
     newest, changed = 0, time.monotonic()
     with Progress(last, shown=not run.options.json) as progress:
         while not run.stop:
@@ -297,15 +306,6 @@ def _sources_ended(run: Run, last: int | None) -> bool:
         return run.player.is_finished
     steps = run.report.source_steps
     return last is not None and bool(steps) and max(steps.values()) >= last
-
-
-def _last_step(configuration: Configuration) -> int | None:
-    ends = [] if configuration.mesh.steps is None else [configuration.mesh.steps]
-    mesh = configuration.mesh
-    files = [sensor.file for sensor in configuration.sensors.values() if sensor.file is not None]
-    if files:
-        ends.append(max(int(read_playback(file, mesh.dt, mesh.start_time).steps[-1]) for file in files))
-    return min(ends) if ends else None
 
 
 def _settle(run: Run) -> None:

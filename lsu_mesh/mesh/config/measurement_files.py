@@ -1,46 +1,30 @@
-"""Recorded measurements and inputs: CSV files with a header, in order of a time or step column.
-
-An empty cell is a missing value. Times are seconds or ISO 8601 (UTC where no zone is given).
-"""
+"""Recorded measurements and inputs by step, from files of data."""
 
 from __future__ import annotations
 
-import csv
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.errors import LsuMeshError
+from lsu_mesh.mesh.data_files import DataFileError, look, read
+from lsu_mesh.mesh.data_files.account import Account, account, place
+from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
+from lsu_mesh.mesh.grid import Grid
 
 if TYPE_CHECKING:
-    from lsu_mesh.mesh.config.settings import MeasurementFileSettings
+    from lsu_mesh.mesh.config.settings import Configuration, MeasurementFileSettings
 
-MAX_SHOWN = 20
-
-
-class FileProblems(LsuMeshError):
-    """A measurement file is wrong; ``lines`` say file, line, column, value and remedy."""
-
-    def __init__(self, lines: Sequence[str]) -> None:
-        shown = list(lines[:MAX_SHOWN])
-        if len(lines) > MAX_SHOWN:
-            shown.append(f"{lines[0].split(': ')[0]}: and {len(lines) - MAX_SHOWN} more mistakes of this kind")
-        super().__init__("\n".join(shown))
-        self.lines = shown
+FileProblems = DataFileError
+"""A measurement file is wrong; ``lines`` say file, line, column, value and remedy."""
 
 
 @dataclass(frozen=True)
 class Columns:
-    """``index`` (T,): seconds or steps; ``values`` (T, m), NaN = missing."""
+    """The value columns of a file."""
 
     columns: tuple[str, ...]
-    index: NDArray[np.float64]
-    values: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -56,107 +40,53 @@ class Playback:
     collisions: int
 
 
-def read_playback(settings: MeasurementFileSettings, dt: float, start_time: float | None) -> Playback:
-    """The file's values by step, ``step = round((t − start_time)/dt)`` for a time column.
+def read_columns(settings: MeasurementFileSettings, default_count: int) -> Columns:
+    """The columns of a file, from its header alone; the rows are not read.
+
+    Without named columns all but the index column are taken, if they are ``default_count``.
+    Raises :class:`FileProblems`.
+    """
+    return Columns(look(settings, default_count))
+
+
+def read_playback(settings: MeasurementFileSettings, dt: object, start_time: object) -> Playback:
+    """The file's values by step; a row with a time is put on the step whose t_k is nearest.
 
     The first row of a step counts.
     Rows before step 1 are left out. Raises :class:`FileProblems`.
     """
-    table = read_columns(settings, default_count=len(settings.columns))
-    if settings.indexed_by == "time":
-        origin = 0.0 if start_time is None else start_time
-        steps = np.rint((table.index - origin) / dt).astype(np.int64)
-        times = np.array([round(t * 1e9) for t in table.index], dtype=np.int64)
-    else:
-        steps = table.index.astype(np.int64)
-        times = np.zeros(len(steps), dtype=np.int64)
-    order = np.argsort(steps, kind="stable")
-    order = order[steps[order] >= 1]
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = steps[order][1:] != steps[order][:-1]
-    kept = order[first]
-    return Playback(steps[kept], np.maximum(times[kept], 0), table.values[kept], int((~first).sum()))
+    data = read(settings)
+    placed = place(data, grid_of(dt, start_time))
+    order = np.flatnonzero(placed.is_delivered)
+    order = order[np.argsort(placed.steps[order], kind="stable")]
+    times = np.zeros(len(placed.steps), dtype=np.int64) if data.time_ns is None else np.maximum(data.time_ns, 0)
+    return Playback(placed.steps[order], times[order], data.values[order], int(placed.is_sharing.sum()))
 
 
-def read_columns(settings: MeasurementFileSettings, default_count: int) -> Columns:
-    """Read and check a CSV file.
+def grid_of(dt: object, start_time: object) -> Grid:
+    """The grid of a mesh; without a start it begins at 0."""
+    return Grid(0 if start_time is None else start_time_ns(start_time)[0], exact_dt(dt))
 
-    Without named columns all but the index column are taken, if they are ``default_count``.
+
+def accounts(configuration: Configuration) -> dict[str, Account]:
+    """What becomes of every row of every file that is played, by the table that names it.
+
+    Raises :class:`FileProblems` with the lines of all files that are wrong, or of which nothing can be played.
     """
-    path = settings.path
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            return _parse(csv.reader(file), settings, default_count)
-    except OSError as error:
-        raise FileProblems([f"{path}: cannot be read: {error.strerror}"]) from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FileProblems([f"{path}: not a CSV file: {error}"]) from None
-
-
-def _parse(rows: csv._reader, settings: MeasurementFileSettings, default_count: int) -> Columns:  # type: ignore[name-defined]
-    path = settings.path
-    header = [name.strip() for name in next(rows, [])]
-    names = settings.columns or tuple(name for name in header if name != settings.index)
-    lines = [
-        f"{path}: line 1: there is no column {name!r}; the columns are {', '.join(header) or 'none'}"
-        for name in dict.fromkeys([settings.index, *names])
-        if name not in header
-    ]
-    if not settings.columns and len(names) != default_count:
-        lines.append(
-            f"{path}: line 1: {len(names)} value columns ({', '.join(names)}) for {default_count} outputs; "
-            "name the right ones with columns = […]"
-        )
-    if lines:
-        raise FileProblems(lines)
-    at = [header.index(name) for name in names]
-    index_at = header.index(settings.index)
-    index: list[float] = []
-    values: list[list[float]] = []
-    for number, row in enumerate(rows, start=2):
-        if not any(cell.strip() for cell in row):
+    mesh = configuration.mesh
+    files = {f"sensors.{name}": sensor.file for name, sensor in configuration.sensors.items()}
+    files["plant"] = None if configuration.plant is None else configuration.plant.file
+    grid, found, lines = grid_of(mesh.dt, mesh.start_time), {}, []
+    for table, settings in files.items():
+        if settings is None:
             continue
-        cells = [*row, *[""] * (len(header) - len(row))]
-        place = f"{path}: line {number}"
-        index.append(_index(cells[index_at], settings, place, lines))
-        values.append([_number(cells[i], header[i], place, lines) for i in at])
-    if not index:
-        lines.append(f"{path}: holds no rows below the header")
+        try:
+            found[table] = account(read(settings), grid, mesh.steps)
+        except FileProblems as error:
+            lines += error.lines
+            continue
+        if found[table].error is not None:
+            lines.append(f"{settings.path}: {found[table].error}")
     if lines:
         raise FileProblems(lines)
-    return Columns(tuple(names), np.array(index), np.array(values).reshape(len(index), len(names)))
-
-
-def _index(cell: str, settings: MeasurementFileSettings, place: str, lines: list[str]) -> float:
-    text = cell.strip()
-    try:
-        value = float(text)
-    except ValueError:
-        value = _iso_seconds(text) if settings.indexed_by == "time" else math.nan
-    whole = settings.indexed_by == "time" or value == math.floor(value) if math.isfinite(value) else False
-    if not whole or abs(value) > 2**53:
-        expected = "seconds or an ISO 8601 time" if settings.indexed_by == "time" else "a whole number"
-        lines.append(f"{place}, column {settings.index!r}: expected {expected}, found {cell!r}")
-        return 0.0
-    return value
-
-
-def _iso_seconds(text: str) -> float:
-    try:
-        moment = datetime.fromisoformat(text)
-        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
-    except ValueError:
-        return math.nan
-
-
-def _number(cell: str, column: str, place: str, lines: list[str]) -> float:
-    text = cell.strip()
-    if not text:
-        return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.inf
-    if not math.isfinite(value):
-        lines.append(f"{place}, column {column!r}: expected a number or nothing (= missing), found {cell!r}")
-    return value
+    return found

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+from lsu_mesh.mesh.config.data_file_keys import KEYS, read_file_format
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
 from lsu_mesh.mesh.config.problem import DataProblem, Problems
@@ -96,8 +98,9 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
     text = table.text("file", None)
     columns = table.texts("columns", None)
     by_time, by_step = table.text("time", None), table.text("step", None)
+    file_format = read_file_format(table)
     if text is None:
-        for key in ("columns", "time", "step"):
+        for key in ("columns", "time", "step", *KEYS):
             if key in table.values:
                 table.without(key, "has no effect without file = the path of a CSV file", "remove it or give the file")
         return None
@@ -112,7 +115,7 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
         table.mismatch("file", "the path of a CSV file", shown(text))
         return None
     path = file_at(text, folder)
-    settings = MeasurementFileSettings(path, tuple(columns or ()), index, indexed_by)
+    settings = MeasurementFileSettings(path, tuple(columns or ()), index, indexed_by, **file_format)
     if not table.problems.reads_files:
         return settings
     try:
@@ -120,7 +123,7 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
     except FileProblems as error:
         table.problems.records += [_data_problem(table, path, line) for line in error.lines]
         return settings
-    return MeasurementFileSettings(path, header, index, indexed_by)
+    return replace(settings, columns=header)
 
 
 def _data_problem(table: Table, path: Path, words: str) -> DataProblem:

@@ -14,6 +14,7 @@ import numpy as np
 
 from lsu_mesh.array_types import Matrix
 from lsu_mesh.mesh.config.problem import Problem
+from lsu_mesh.mesh.data_files.settings import DataFileSettings
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
@@ -51,15 +52,8 @@ class PlantSettings:
     file: MeasurementFileSettings | None
 
 
-@dataclass(frozen=True)
-class MeasurementFileSettings:
-    """Where recorded values lie: a CSV file, its value columns, and the column that orders them."""
-
-    path: Path
-    columns: tuple[str, ...]
-    index: str
-    indexed_by: str
-    """``"time"`` (seconds or ISO 8601) or ``"step"``."""
+MeasurementFileSettings = DataFileSettings
+"""Where recorded values lie; nothing of the file is read to hold them."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
 from lsu_mesh_services.configuration import load_or_explain, print_warnings
 from lsu_mesh_services.exit_codes import FAILURE, NOT_MET, OK, USAGE
+from lsu_mesh_services.played_files import accounts_or_explain
 
 Rows = Mapping[int, Iterable[float | None]]
 
@@ -39,6 +40,8 @@ def main(options: argparse.Namespace) -> int:
     if unknown_sensors:
         known = nearest(unknown_sensors[0], configuration.sensors)
         print(f"{options.file}: there is no sensor {unknown_sensors[0]!r}; {known}", file=sys.stderr)
+        return USAGE
+    if not options.recording and accounts_or_explain(configuration) is None:
         return USAGE
     try:
         names, Y, U, first = _data(configuration, options)

@@ -10,6 +10,7 @@ import time
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.problem import nearest
+from lsu_mesh.mesh.data_files import DataFileError
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh_services.configuration import load_or_explain
@@ -28,7 +29,11 @@ def main(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return USAGE
-    return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
+    try:
+        return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
+    except DataFileError as error:  # only the sensor that plays a file reads it whole
+        print(error, file=sys.stderr)
+        return USAGE
 
 
 def _run(configuration: Configuration, options: argparse.Namespace) -> int:

@@ -12,9 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load
+from lsu_mesh.mesh.config.measurement_files import accounts
+from lsu_mesh.mesh.data_files import DataFileError
 from lsu_mesh_services.configuration import print_problems
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.network.security import missing_files
+from lsu_mesh_services.played_files import account_warnings, as_records, explained
 
 
 def main(options: argparse.Namespace) -> int:
@@ -26,13 +29,25 @@ def main(options: argparse.Namespace) -> int:
         else:
             print_problems(error)
         return USAGE
+    try:
+        played = accounts(configuration)
+    except DataFileError as error:
+        if options.json:
+            _print_lines([{"level": "error", "file": str(configuration.path), "text": line} for line in error.lines])
+        else:
+            print(explained(error), file=sys.stderr)
+        return USAGE
     warnings = [*configuration.warnings, *missing_files(configuration)]
+    doubts = account_warnings(played)
     if options.json:
-        _print_lines([*(warning.as_record() for warning in warnings), _summary(configuration, len(warnings))])
+        records = [{"level": "warning", "file": str(configuration.path), "text": text} for text in doubts]
+        summary = _summary(configuration, len(warnings) + len(doubts)) | {"files": as_records(played)}
+        _print_lines([*(warning.as_record() for warning in warnings), *records, summary])
         return OK
     peers = [f"{role} {name}" for role, name in configuration.peers()]
     fine = f"{options.file}: fine; mesh {configuration.mesh.name!r} with {len(peers)} peers: {', '.join(peers)}"
-    print(*warnings, fine, sep="\n", file=sys.stderr)
+    lines = [line for one in played.values() for line in one.lines()]
+    print(*warnings, *doubts, *lines, fine, sep="\n", file=sys.stderr)
     return OK
 
 

@@ -10,10 +10,12 @@ from typing import Any
 import pytest
 
 from lsu_mesh.mesh.config import load, load_with_keys
+from lsu_mesh.mesh.config.data_file_keys import KEYS
 
 OPTION = re.compile(r"^# (\w+ = .*)$", re.MULTILINE)
 EXCLUSIVE = {"sensors.s3.step", "sensors.s3.time", "sensors.s3.file", "sensors.s3.columns", "plant.file",
-             "plant.columns", "plant.step", "plant.time", "filters.window.E"}  # fmt: skip
+             "plant.columns", "plant.step", "plant.time", "filters.window.E",
+             *(f"{table}.{key}" for table in ("sensors.s3", "plant") for key in KEYS)}  # fmt: skip
 """Options that stand beside another one in the example, so that both cannot be on."""
 
 
@@ -99,6 +101,7 @@ def test_the_commented_values_are_the_defaults(example: Path, tmp_path: Path) ->
             "transfer_from",
             "noise_map",
             "adopt",
+            *KEYS,
         )
         lines.append(option[1] if option and not option[1].startswith(skipped) else line)
     variant = tmp_path / "variant.toml"

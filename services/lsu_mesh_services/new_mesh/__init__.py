@@ -1,0 +1,1 @@
+"""Configurations to start from: the texts that ``lsu-mesh new`` writes."""

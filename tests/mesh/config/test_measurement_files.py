@@ -1,0 +1,80 @@
+"""What a mesh plays from files: by step, read once, and counted."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from lsu_mesh.mesh.config import Configuration, load
+from lsu_mesh.mesh.config.measurement_files import FileProblems, accounts, read_columns, read_playback
+from lsu_mesh.mesh.config.settings import MeasurementFileSettings
+
+
+@pytest.fixture
+def demo(root: Path) -> str:
+    return (root / "services" / "lsu_mesh_services" / "demo.toml").read_text()
+
+
+def playing(tmp_path: Path, demo: str, csv: str, keys: str = "") -> Configuration:
+    (tmp_path / "s1.csv").write_text(csv)
+    text = demo.replace("C = [[1.0, 0.0, 0.5]]", f'C = [[1.0, 0.0, 0.5]]\nfile = "s1.csv"\n{keys}', 1)
+    (tmp_path / "mesh.toml").write_text(text)
+    return load(tmp_path / "mesh.toml")
+
+
+def test_loading_reads_the_header_and_nothing_else(tmp_path: Path, demo: str) -> None:
+    configuration = playing(tmp_path, demo, "step,y\n" + "1,0.5\n" * 100_000 + "2,high\n")
+    file = configuration.sensors["s1"].file
+    assert file is not None
+    assert file.columns == ("y",)
+    with pytest.raises(FileProblems, match="line 100002, column 'y'"):
+        accounts(configuration)
+
+
+def test_mistakes_of_rows_come_together(tmp_path: Path, demo: str) -> None:
+    configuration = playing(tmp_path, demo, "step,y\n1,0.5\n2,high\n3,inf\n2.5,1\n")
+    with pytest.raises(FileProblems) as caught:
+        accounts(configuration)
+    step, text, infinite = (line.removeprefix(f"{tmp_path}/") for line in caught.value.lines)
+    assert step == "s1.csv: line 5, column 'step': expected a whole number, found '2.5'"
+    assert text.startswith("s1.csv: line 3, column 'y': expected a number or nothing (= missing), found 'high'; if it")
+    assert infinite.startswith(
+        "s1.csv: line 4, column 'y': expected a number or nothing (= missing), found 'inf'; leave"
+    )
+
+
+def test_a_file_of_which_nothing_plays_is_a_mistake(tmp_path: Path, demo: str) -> None:
+    configuration = playing(tmp_path, demo, "step,y\n0,0.5\n", "")
+    with pytest.raises(FileProblems, match="no row is played: its steps are 0 to 0"):
+        accounts(configuration)
+
+
+def test_what_is_played_is_what_is_counted(tmp_path: Path, demo: str) -> None:
+    text = demo.replace("dt = 0.02", "dt = 0.02\nstart_time = 0.0")
+    configuration = playing(tmp_path, text, "t,y\n0.02,1\n0.041,2\n0.039,3\n-1,4\n0.1,\n", 'time = "t"')
+    found, file = accounts(configuration)["sensors.s1"], configuration.sensors["s1"].file
+    assert file is not None
+    played = read_playback(file, 0.02, 0.0)
+    assert (found.rows, found.delivered, found.before, found.sharing) == (5, 3, 1, 1)
+    assert played.steps.tolist() == [1, 2, 5]
+    assert (played.collisions, found.steps_used) == (1, 3)
+
+
+def test_rows_are_put_on_the_nearest_step_and_the_first_one_counts(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text("t,y\n100.5,1.0\n101.02,\n102.5,1.5\n102.6,7\n99,3\n")
+    settings = MeasurementFileSettings(tmp_path / "data.csv", ("y",), "t", "time")
+    played = read_playback(settings, 0.5, 100.0)
+    assert played.steps.tolist() == [1, 2, 5]
+    assert played.time_ns.tolist() == [100_500_000_000, 101_020_000_000, 102_500_000_000]
+    assert played.values[:, 0].tolist()[::2] == [1.0, 1.5]
+    assert played.collisions == 1
+    assert read_columns(settings, 1).columns == ("y",)
+
+
+def test_a_step_of_a_third_of_a_second_does_not_drift(tmp_path: Path) -> None:
+    rows = "".join(f"{float(Fraction(k, 3))!r},{k}\n" for k in range(1, 2000))
+    (tmp_path / "data.csv").write_text(f"t,y\n{rows}")
+    played = read_playback(MeasurementFileSettings(tmp_path / "data.csv", (), "t", "time"), "1/3", None)
+    assert played.steps.tolist() == played.values[:, 0].tolist()
