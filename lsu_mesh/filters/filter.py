@@ -32,6 +32,8 @@ class Filter(ABC):
     """
 
     kind: ClassVar[str]
+    algorithm: ClassVar[int] = 1
+    """Number of the arithmetic of this kind, raised whenever the bits of its sets change; published with each set."""
     guarantee: ClassVar[Guarantee] = "declared"
     """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates."""
 

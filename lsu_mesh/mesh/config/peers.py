@@ -5,18 +5,24 @@ from __future__ import annotations
 import inspect
 from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import get_args
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.registry import FILTERS, filter_class
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
 from lsu_mesh.mesh.config.settings import (
+    FaultKind,
     FilterSettings,
     FusionSettings,
     IdentifierSettings,
+    Learn,
     MeasurementFileSettings,
+    OnContradiction,
     PlantSettings,
     SensorFault,
     SensorSettings,
+    TransferWay,
 )
 from lsu_mesh.mesh.config.table import REQUIRED, Problems, Table, file_at, nearest
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
@@ -24,10 +30,10 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
 INPUTS = ("normal", "sine", "zero")
-FAULTS = ("bias", "drift", "stuck", "random", "lost")
-TRANSFERS = ("off", "predictor", "fused", "data-predictor")
-CONTRADICTIONS = ("reset", "hold", "widen")
-POLICIES = ("intersect", "relaxed")
+FAULTS: tuple[FaultKind, ...] = get_args(FaultKind)
+TRANSFERS: tuple[TransferWay, ...] = get_args(TransferWay)
+CONTRADICTIONS: tuple[OnContradiction, ...] = get_args(OnContradiction)
+LEARNS: tuple[Learn, ...] = get_args(Learn)
 
 
 def read_plant(
@@ -97,7 +103,7 @@ def _read_fault(table: Table) -> SensorFault:
         table.wrong("to", f"is {last}, before from = {first}")
     size = table.number("size", 1.0)
     table.finish()
-    return SensorFault(kind if isinstance(kind, str) else "bias", first, last, size)
+    return SensorFault("bias" if kind is REQUIRED else kind, first, last, size)
 
 
 def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementFileSettings | None:
@@ -179,7 +185,9 @@ def _read_adopt(table: Table, identifiers: Collection[str], model: LSUModel | No
     return str(adopt)
 
 
-def _read_senders(table: Table, name: str, transfer: str, peers: Mapping[str, Collection[str]]) -> tuple[str, ...]:
+def _read_senders(
+    table: Table, name: str, transfer: TransferWay, peers: Mapping[str, Collection[str]]
+) -> tuple[str, ...]:
     """``transfer_from``: by default all other filters, or for fused boxes all fusions."""
     known = peers["fusion"] if transfer == "fused" else [other for other in peers["filters"] if other != name]
     given = table.texts("transfer_from", None)
@@ -234,11 +242,13 @@ def read_fusion(
     """``[fusion.NAME]``; sources are filters and other fusions."""
     known = dict.fromkeys(other for other in (*filters, *peers["fusion"]) if other != name)
     sources = _read_names(table, "sources", known)
-    policy = table.choice("policy", POLICIES, "intersect")
+    policy = table.choice("policy", tuple(POLICIES), "intersect")
     faults = table.whole("faults", 0)
-    if policy == "intersect" and faults:
-        table.wrong("faults", f'is {faults}, but policy = "intersect" trusts every source; set policy = "relaxed"')
-    if policy == "relaxed" and sources and faults >= len(sources):
+    chosen = POLICIES[policy]
+    if faults and not chosen.takes_faults:
+        others = " or ".join(f'"{other.name}"' for other in POLICIES.values() if other.takes_faults)
+        table.wrong("faults", f'is {faults}, but policy = "{policy}" trusts every source; set policy = {others}')
+    elif sources and len(sources) < chosen.sources_needed(faults):
         table.wrong("faults", f"is {faults} of {len(sources)} sources; at least one source must be right")
     max_lag = table.whole("max_lag", 16, low=0, high=4096)
     deadline = table.duration("deadline", 0.05)
@@ -254,7 +264,7 @@ def read_fusion(
 def read_identifier(table: Table, name: str, sensors: Mapping[str, SensorSettings]) -> IdentifierSettings:
     """``[identifier.NAME]``."""
     chosen = _read_names(table, "sensors", sensors)
-    learn = table.choice("learn", ("r", "rho", "both"), "both")
+    learn = table.choice("learn", LEARNS, "both")
     window = table.whole("window", 200, low=2, high=100_000)
     every = table.whole("every", 50, low=1)
     margin = table.number("margin", 1.2)
@@ -314,7 +324,7 @@ def shared_sensor_warnings(filters: Mapping[str, FilterSettings], fusion: Mappin
     """A sensor that feeds several sources of a relaxed fusion makes that many of them lie at once."""
     warnings = []
     for settings in fusion.values():
-        if settings.policy != "relaxed":
+        if not POLICIES[settings.policy].takes_faults:
             continue
         fed: dict[str, list[str]] = {}
         for source in settings.sources:

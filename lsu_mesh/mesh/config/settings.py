@@ -8,7 +8,7 @@ import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,14 @@ from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
 Matrix = NDArray[np.float64]
+TransferWay = Literal["off", "predictor", "fused", "data-predictor"]
+"""What a filter takes from others: nothing, their predictions, fused boxes, or their output predictors."""
+OnContradiction = Literal["reset", "hold", "widen"]
+"""What a filter does when data go on contradicting its set."""
+FaultKind = Literal["bias", "drift", "stuck", "random", "lost"]
+"""A simulated fault of a sensor."""
+Learn = Literal["r", "rho", "both"]
+"""Which bounds an identifier suggests."""
 CACHED_SECONDS, LEAST_CACHED = 6.0, 256
 """So much of the past a publisher keeps: the lease and a reconnection, with room."""
 
@@ -58,7 +66,7 @@ class MeasurementFileSettings:
 class SensorFault:
     """A simulated fault of a sensor at steps first … last: bias, drift (per step), stuck, random, or lost."""
 
-    kind: str
+    kind: FaultKind
     first: int
     last: int
     size: float
@@ -92,10 +100,10 @@ class FilterSettings:
     sensors: tuple[str, ...]
     deadline: float
     history: int
-    transfer: str
+    transfer: TransferWay
     transfer_from: tuple[str, ...]
     """Filters (predictors) or fusions (fused boxes) whose knowledge is transferred."""
-    on_contradiction: str
+    on_contradiction: OnContradiction
     reset_after: int
     options: Mapping[str, Any]
     adopt: str = ""
@@ -123,7 +131,7 @@ class IdentifierSettings:
 
     name: str
     sensors: tuple[str, ...]
-    learn: str
+    learn: Learn
     window: int
     every: int
     margin: float

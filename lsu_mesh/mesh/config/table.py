@@ -7,14 +7,19 @@ import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from lsu_mesh.errors import LsuMeshError
 
 T = TypeVar("T")
+Word = TypeVar("Word", bound=str)
 REQUIRED: Any = object()
 _DURATION = re.compile(r"(\d+(?:\.\d+)?)\s*(us|ms|s|min)")
 _UNIT_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0}
+
+
+def _word(value: Any) -> Any:
+    return value if isinstance(value, str) else None
 
 
 class ConfigurationError(LsuMeshError):
@@ -88,13 +93,13 @@ class Table:
         """A string."""
         return self.read(key, default, "a string", lambda v: v if isinstance(v, str) and v else None)
 
-    def choice(self, key: str, choices: Sequence[str], default: str) -> str:
+    def choice(self, key: str, choices: Sequence[Word], default: Word) -> Word:
         """One of a few words."""
-        found: str = self.read(key, default, "a string", lambda v: v if isinstance(v, str) else None)
+        found: Any = self.read(key, default, "a string", _word)
         if found is not REQUIRED and found not in choices:
             self.wrong(key, f'"{found}" is no choice; {nearest(found, choices)} (choices: {", ".join(choices)})')
             return choices[0]
-        return found
+        return cast("Word", found)
 
     def flag(self, key: str, default: bool) -> bool:
         """true or false."""

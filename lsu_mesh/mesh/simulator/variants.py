@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lsu_mesh.mesh.config import Configuration, load
-from lsu_mesh.mesh.config.settings import FilterSettings
+from lsu_mesh.mesh.config.settings import FilterSettings, TransferWay
 from lsu_mesh.supports.orthotope import Orthotope
 
 RATE = 20.0
@@ -38,7 +38,7 @@ class Variant(NamedTuple):
 
     kinds: tuple[tuple[str, str], ...] = ()
     """Filters and their kinds; empty: the mesh as it is."""
-    transfer: tuple[str, str] = ("", "off")
+    transfer: tuple[str, TransferWay] = ("", "off")
     """A filter and the way in which it takes transfers."""
     extra: str = ""
     """``domain`` or ``input_box``."""
@@ -54,9 +54,13 @@ def draw_variant(rng: random.Random, base: Configuration) -> Variant:
     if rng.random() < AS_IT_IS:
         return Variant()
     kinds = tuple((name, _draw_kind(rng, settings.kind)) for name, settings in sorted(base.filters.items()))
-    ways = ["off", "off", *(["predictor"] if len(base.filters) > 1 else []), *(["fused"] if base.fusion else [])]
+    ways: list[TransferWay] = ["off", "off"]
+    if len(base.filters) > 1:
+        ways.append("predictor")
+    if base.fusion:
+        ways.append("fused")
     way = rng.choice(ways)
-    transfer = ("", "off") if way == "off" else (rng.choice(sorted(base.filters)), way)
+    transfer: tuple[str, TransferWay] = ("", "off") if way == "off" else (rng.choice(sorted(base.filters)), way)
     return Variant(kinds, transfer, rng.choice(("", "", "", "domain", "input_box")))
 
 
