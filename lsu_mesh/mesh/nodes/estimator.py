@@ -52,9 +52,7 @@ class Estimator(Node):
         """Whether the last tick has left steps that may be ready."""
         self._candidate: Posterior | None = None
         self._waiting = ""
-        self._counts: dict[str, float] = {
-            "late": 0, "rewinds": 0, "contradictions": 0, "behind": 0, "resets": 0,
-        }  # fmt: skip
+        self._counts: dict[str, float] = dict.fromkeys(("late", "rewinds", "contradictions", "behind", "resets"), 0)
         self._remarks: list[Message] = []
         """Events of a time update."""
         self.last_posterior: Posterior | None = None
@@ -391,12 +389,8 @@ class Estimator(Node):
         return found + ([] if has_ended or is_early else self._source_timeouts.complaints(now))
 
     def counters(self) -> dict[str, float]:
-        timeline = self.timeline
-        return self._counts | {
-            "from the future": timeline.from_the_future,
-            "epoch": self.held.epochs.number,
-            "newest": timeline.arrivals.newest,
-        }
+        future, newest = self.timeline.from_the_future, self.timeline.arrivals.newest
+        return self._counts | {"from the future": future, "epoch": self.held.epochs.number, "newest": newest}
 
     def noise_bounds(self, factor: float = 1.0) -> Bounds:
         """rho and r in force; r of this step widened by ``factor``."""
