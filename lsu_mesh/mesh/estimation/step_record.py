@@ -42,8 +42,11 @@ class Combined:
 
 
 def published_content(posterior: Posterior) -> tuple[object, ...]:
-    """What makes a step worth telling again when it changes: the set, what it is worth, and who is not in it."""
+    """What makes a step worth telling again when it changes: the set, what it is worth, and who is not in it.
+
+    Later sets name the published one as their base, so they must descend from what it says.
+    """
     box = posterior.lower, posterior.upper
     rejected = (posterior.rejected,) if isinstance(posterior, Fused) else ()
-    claims = posterior.status, posterior.epoch, posterior.guarantee, posterior.missing
+    claims = posterior.status, posterior.epoch, posterior.descent, posterior.guarantee, posterior.missing
     return posterior.support, box, *claims, *rejected

@@ -221,8 +221,8 @@ class Estimator(Node):
         held = self.held
         support, old = to_message(self.engine.support), step.published
         box = tuple(bound.tolist() for bound in self.published_bounds())
-        told = (support, box, combined.status, held.epochs.number, held.guarantee, list(combined.missing))
-        if old is not None and (*told, *self.content()) == published_content(old):
+        claims = (combined.status, held.epochs.number, held.descent, held.guarantee, list(combined.missing))
+        if old is not None and (support, box, *claims, *self.content()) == published_content(old):
             held.record_published(old)
             return None
         step.revision += 1
