@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import key
-from lsu_mesh.mesh.messages import Event, Message, Posterior, Truth, encode
+from lsu_mesh.mesh.messages import TYPES, Event, Message, Posterior, Truth, encode
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.identifier import IdentifierNode
@@ -34,6 +35,7 @@ class LocalMesh:
         self.nodes: dict[str, Node] = {}
         self._carry = carry or (lambda address, payload, node: True)
         self._boots = 0
+        self._reader = Admission(configuration, TYPES)
         for role, name in configuration.peers():
             if role != "recorder":
                 self.start(role, name)
@@ -81,9 +83,10 @@ class LocalMesh:
             moved = len(self.sent) > before
 
     def publish(self, node: Node, messages: Sequence[Message]) -> None:
-        """Hand a node's messages to everyone who listens."""
+        """Hand a node's messages to everyone who listens; one that receivers would refuse is a mistake of the node."""
         for message in messages:
             address, payload = node.key(message), encode(message)
+            assert self._reader.admit(address, payload) is not None, self._reader.last_refusal
             self.sent.append((address, message))
             self.hand_over(address, payload)
 

@@ -33,6 +33,8 @@ class Filter(ABC):
     """
 
     kind: ClassVar[str]
+    algorithm: ClassVar[int] = 1
+    """Number of the arithmetic of this kind, raised whenever the bits of its sets change; published with each set."""
     """Name in errors; a class that states none is called by its class name."""
     guarantee: ClassVar[Guarantee]
     """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates.

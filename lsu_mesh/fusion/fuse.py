@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.fusion.intersection import Fusion, fuse_all
-from lsu_mesh.fusion.relaxed import fuse_relaxed
+from lsu_mesh.fusion.intersection import Fusion
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.supports.support import Support
 
 
@@ -18,7 +18,8 @@ def fuse(supports: Sequence[Support], policy: str = "intersect", faults: int = 0
     supports:
         Sets of one step and one dimension, of any kinds; at least one.
     policy, faults:
-        ``"relaxed"`` holds the state as long as at most ``faults`` of the sources are wrong.
+        A name of :data:`lsu_mesh.fusion.policies.POLICIES`. ``"relaxed"`` holds the state as long as at most
+        ``faults`` of the sources are wrong.
 
     Raises
     ------
@@ -30,12 +31,13 @@ def fuse(supports: Sequence[Support], policy: str = "intersect", faults: int = 0
     Copies, order and grouping of the sources do not matter, but for rounding: intersection is idempotent, commutative
     and associative.
     """
-    if policy not in ("intersect", "relaxed"):
-        raise ModelError(f'policy must be "intersect" or "relaxed", it is {policy!r}')
+    chosen = POLICIES.get(policy)
+    if chosen is None:
+        names = " or ".join(f'"{name}"' for name in POLICIES)
+        raise ModelError(f"policy must be {names}, it is {policy!r}")
     if not supports:
         raise ModelError("fusion needs at least one support, it has none")
-    if faults and policy == "intersect":
-        raise ModelError(f'faults = {faults} needs policy = "relaxed"; "intersect" trusts every source')
-    if policy == "relaxed" and faults:
-        return fuse_relaxed(supports, faults)
-    return fuse_all(supports)
+    if faults and not chosen.takes_faults:
+        names = " or ".join(f'"{other.name}"' for other in POLICIES.values() if other.takes_faults)
+        raise ModelError(f'faults = {faults} needs policy = {names}; "{policy}" trusts every source')
+    return chosen.function(supports, faults)

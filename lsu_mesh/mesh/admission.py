@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Collection
 
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.messages import (
@@ -194,6 +195,9 @@ class Admission:
             raise Refused("step", "steps count from 1")
         if self._last is not None and message.step > self._last + 1:
             raise Refused("step", f"step {message.step} of a mesh that ends at step {self._last}")
+        if isinstance(message, Fused) and message.policy not in POLICIES:
+            known = ", ".join(POLICIES)
+            raise Refused("policy", f"fused by policy {message.policy!r}, which this peer does not know ({known})")
         if isinstance(message, Prediction | Posterior) and complexity(message.support) > self._most_generators:
             raise Refused("complexity", f"more than {self._most_generators} generators or constraints")
 

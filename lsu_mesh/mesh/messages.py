@@ -298,7 +298,8 @@ class Fused(Posterior, frozen=True, kw_only=True):
     """Support that holds the state by all accepted sources together."""
 
     topic = "fused"
-    policy: Literal["intersect", "relaxed"]
+    policy: Text
+    """A name of ``POLICIES``; admission refuses one that this peer does not know."""
     faults: Count
     rejected: Annotated[list[Rejection], Meta(max_length=4096)]
     quarantined: Annotated[list[Text], Meta(max_length=4096)]

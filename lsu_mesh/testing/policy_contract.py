@@ -11,6 +11,7 @@ import numpy as np
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.fusion.intersection import Fusion
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.testing.exact_plant import Exact, inside_box
@@ -29,7 +30,7 @@ ROUNDING = 1e-9
 
 def fusion_policies() -> tuple[str, ...]:
     """Names of all policies."""
-    return ("intersect", "relaxed")
+    return tuple(POLICIES)
 
 
 def check_policy(name: str, faults: Iterable[int] | None = None, seeds: int | Iterable[int] = SEEDS) -> None:

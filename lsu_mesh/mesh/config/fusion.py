@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import get_args
 
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.filters import read_names
 from lsu_mesh.mesh.config.problem import Problem, Problems
 from lsu_mesh.mesh.config.settings import FilterSettings, FusionSettings, IdentifierSettings, Learn, SensorSettings
 from lsu_mesh.mesh.config.table import Table
 
-POLICIES = ("intersect", "relaxed")
 LEARN: tuple[Learn, ...] = get_args(Learn)
 
 
@@ -20,12 +20,14 @@ def read_fusion(
     """``[fusion.NAME]``; sources are filters and other fusions."""
     known = dict.fromkeys(other for other in (*filters, *peers["fusion"]) if other != name)
     sources = read_names(table, "sources", known)
-    policy = table.choice("policy", POLICIES, "intersect")
+    policy = table.choice("policy", tuple(POLICIES), "intersect")
     faults = table.whole("faults", 0)
-    if policy == "intersect" and faults:
-        text = f'is {faults}, but policy = "intersect" trusts every source; set policy = "relaxed"'
-        table.wrong("faults", text, '0, or policy = "relaxed"')
-    if policy == "relaxed" and sources and faults >= len(sources):
+    chosen = POLICIES[policy]
+    if faults and not chosen.takes_faults:
+        others = " or ".join(f'"{other.name}"' for other in POLICIES.values() if other.takes_faults)
+        text = f'is {faults}, but policy = "{policy}" trusts every source; set policy = {others}'
+        table.wrong("faults", text, f"0, or policy = {others}")
+    elif sources and len(sources) < chosen.sources_needed(faults):
         text = f"is {faults} of {len(sources)} sources; at least one source must be right"
         table.wrong("faults", text, f"a whole number < {len(sources)}")
     max_lag = table.whole("max_lag", 16, low=0, high=4096)
@@ -86,7 +88,7 @@ def shared_sensor_warnings(
     return [
         warning
         for settings in fusion.values()
-        if settings.policy == "relaxed"
+        if POLICIES[settings.policy].takes_faults
         for warning in (*_shared_sensors(file, settings, filters), *_transfers(file, settings, filters))
     ]
 

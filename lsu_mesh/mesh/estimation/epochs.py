@@ -64,6 +64,14 @@ class Epochs:
         self._newest[self._own] = self.number
         self._relied.clear()
 
+    def snapshot(self) -> dict[Peer, int]:
+        """What the own set descends from, for :meth:`restore`."""
+        return dict(self._relied)
+
+    def restore(self, snapshot: dict[Peer, int]) -> None:
+        """The own set is an earlier one of the same epoch again."""
+        self._relied = dict(snapshot)
+
     def continue_from(self, number: int) -> None:
         """Go on from an epoch of an earlier life."""
         self.number = self._newest[self._own] = max(self.number, number)

@@ -7,21 +7,37 @@ import math
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.lsuo import LSUO
+from lsu_mesh.mesh.messages import Reference
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
+
+MAX_LISTED = 2048
+"""Inputs that a set made from the reachable box lists at the most: receivers refuse longer lists."""
 
 
 class OpenLoop:
     """The reachable box ``X_{k+1} = |A| X_k ⊕ B u_k ⊕ N box(rho)`` of the prior, met with the domain; no data in it.
 
     It is lost when a node starts from anything but the prior, when an input is lost, or when it has outgrown double
-    precision.
+    precision. ``lists_inputs``: whether it remembers which inputs were known, because a box may stand in for others.
     """
 
-    def __init__(self, model: LSUModel) -> None:
+    def __init__(self, model: LSUModel, *, lists_inputs: bool = False) -> None:
         self._model = model
+        self._lists_inputs = lists_inputs
         self._engine: LSUO | None = None
+        self._inputs: dict[int, Reference] = {}
+        """By step; a step without was carried through with the input box."""
+
+    def inputs_before(self, k: int) -> tuple[Reference, ...]:
+        """The inputs that went into the box of step k, in order; in the other steps the input box stood in.
+
+        Empty where no input box may stand in, so that all of them did, and where they are more than ``MAX_LISTED``.
+        """
+        if k - 1 > MAX_LISTED:
+            return ()
+        return tuple(reference for step, reference in sorted(self._inputs.items()) if step < k)
 
     @property
     def box(self) -> Orthotope | None:
@@ -35,15 +51,20 @@ class OpenLoop:
     def begin(self, prior: Support) -> None:
         """Hold the prior of step 1."""
         self._engine = LSUO(self._model, prior)
+        self._inputs.clear()
 
     def lose(self) -> None:
         """From now on there is none."""
         self._engine = None
+        self._inputs.clear()
 
-    def predict(self, u: Vector | Orthotope | None) -> None:
-        """Time update with the step's input, or with the box of all inputs."""
+    def predict(self, u: Vector | Orthotope | None, k: int = 0, reference: Reference | None = None) -> None:
+        """Time update of step k with its input, called ``reference``, or with the box of all inputs."""
         if self._engine is None:
             return
+        self._inputs.pop(k, None)
+        if self._lists_inputs and reference is not None and k <= MAX_LISTED:
+            self._inputs[k] = reference
         try:
             self._engine.predict(u)
         except (UnboundedSupport, InconsistentData):

@@ -12,9 +12,9 @@ from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.estimation.epochs import Epochs
 from lsu_mesh.mesh.estimation.inconsistency import explains
-from lsu_mesh.mesh.estimation.step_record import Base
+from lsu_mesh.mesh.estimation.open_loop import OpenLoop
 from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, SOUND
-from lsu_mesh.mesh.messages import Fused, Input, Reference
+from lsu_mesh.mesh.messages import Base, Fused, Input, Reference
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.supports.orthotope import Orthotope
 
@@ -53,7 +53,7 @@ class RestartSearch:
         self._fused.clear()
 
     def find(
-        self, engine: Filter, k: int, y: Vector, reach: Orthotope | None, inputs: Mapping[int, Input], *, abandons: bool
+        self, engine: Filter, k: int, y: Vector, reach: OpenLoop, inputs: Mapping[int, Input], *, abandons: bool
     ) -> Start | None:
         """A set of step k, before its data y (m,), that is sound and meets them; ``None`` where there is none.
 
@@ -65,10 +65,12 @@ class RestartSearch:
         newest_first = sorted(self._fused.values(), key=lambda fused: -fused.step)
         carried_on = (self._carried(engine, fused, k, inputs, abandons) for fused in newest_first)
         starts = [start for start in carried_on if start is not None]
-        if reach is not None:
-            starts.append(_made(engine, reach, "reach", "the prior carried through all inputs"))
-        if engine.model.domain is not None:
-            starts.append(_made(engine, engine.model.domain, "domain", "the domain"))
+        box, domain = reach.box, engine.model.domain
+        if box is not None:
+            words = "the prior carried through all inputs"
+            starts.append(Start(_holding(engine, box), "reach", words, reach.inputs_before(k)))
+        if domain is not None:
+            starts.append(Start(_holding(engine, domain), "domain", "the domain"))
         starts.sort(key=lambda start: start.guarantee != "declared")
         met = None
         for start in starts:
@@ -104,6 +106,6 @@ class RestartSearch:
         return Start(engine.snapshot(), fused.reference, f"the fused set of step {fused.step}", used, fused)
 
 
-def _made(engine: Filter, support: Orthotope, base: Base, words: str) -> Start:
+def _holding(engine: Filter, support: Orthotope) -> object:
     engine.reset(support)
-    return Start(engine.snapshot(), base, words)
+    return engine.snapshot()

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from lsu_mesh.mesh.estimation.held_set import Held
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Prediction, Reference
 
-Base = Reference | Literal["prior", "reach", "domain", "sources"]
 Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 
 
@@ -19,13 +19,8 @@ class Step:
     arrived: dict[str, Message] = field(default_factory=dict)
     """Newest message of each source."""
     input: Input | None = None
-    before: object | None = None
-    """The set before the step's data, for rewinding."""
-    reach: object | None = None
-    """The prior carried to the step."""
-    base: Base = "prior"
-    used_before: tuple[Reference, ...] = ()
-    """Base of ``before`` and what was used since."""
+    before: Held | None = None
+    """What was held before the step's data, for rewinding."""
     transfers: Sequence[Prediction | Fused] | None = None
     """Transfers used when the step was first closed; a replay uses the same."""
     closed: bool = False
@@ -47,6 +42,11 @@ class Combined:
 
 
 def published_content(posterior: Posterior) -> tuple[object, ...]:
-    """What makes a step worth telling again when it changes: the set, what it is worth, and who is missing in it."""
+    """What makes a step worth telling again when it changes: the set, what it is worth, and who is not in it.
+
+    Later sets name the published one as their base, so they must descend from what it says.
+    """
     box = posterior.lower, posterior.upper
-    return posterior.support, box, posterior.status, posterior.epoch, posterior.guarantee, posterior.missing
+    rejected = (posterior.rejected,) if isinstance(posterior, Fused) else ()
+    claims = posterior.status, posterior.epoch, posterior.descent, posterior.guarantee, posterior.missing
+    return posterior.support, box, *claims, *rejected

@@ -15,6 +15,7 @@ Three ways (Kuklišová Pavelková, Jirsa, Quinn 2022, and the design of this me
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import assert_never
 
 import numpy as np
 
@@ -45,9 +46,20 @@ class Transfer:
         self._predictions: dict[int, dict[str, Prediction]] = {}
         self._fused: dict[int, dict[str, Fused]] = {}
 
+    @property
+    def takes_predictions(self) -> bool:
+        """Whether the predictions of other filters are transferred."""
+        match self.way:
+            case "predictor" | "data-predictor":
+                return True
+            case "fused" | "off":
+                return False
+            case _:
+                assert_never(self.way)
+
     def record(self, message: Message) -> None:
         """Remember a prediction or a fused set."""
-        if isinstance(message, Prediction) and self.way in ("predictor", "data-predictor"):
+        if isinstance(message, Prediction) and self.takes_predictions:
             self._predictions.setdefault(message.step, {})[message.name] = message
         elif isinstance(message, Fused) and self.way == "fused":
             boxes = self._fused.setdefault(message.step, {})
@@ -68,7 +80,7 @@ class Transfer:
         self, k: int, inputs: Mapping[int, Input], epochs: Epochs, *, needs_inputs: bool
     ) -> Sequence[Prediction | Fused]:
         """What can be brought to the prediction of step k, sources by name; nothing of an abandoned epoch."""
-        if self.way in ("predictor", "data-predictor"):
+        if self.takes_predictions:
             predictions = sorted(self._predictions.get(k, {}).items())
             return [message for _, message in predictions if not epochs.is_abandoned(message)]
         for j in range(k - 1, max(0, k - 1 - MAX_BOX_AGE), -1):
@@ -83,9 +95,7 @@ class Transfer:
         """The set of step k that a message stands for; ``InconsistentData`` for an empty strip."""
         if isinstance(message, Fused):
             return carried(message, k, engine.model, inputs)
-        if self.way == "predictor":
-            return to_support(message.support)
-        return self._strip(message, engine)
+        return self._strip(message, engine) if self.way == "data-predictor" else to_support(message.support)
 
     def _strip(self, message: Prediction, engine: Filter) -> Support:
         """Strips of the outputs that source and target both have (equal rows of C), with the target's r."""

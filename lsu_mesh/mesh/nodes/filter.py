@@ -2,54 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
-from lsu_mesh.mesh.estimation.inconsistency import Dropped, update_without_contradicting_strips, widen
+from lsu_mesh.mesh.estimation.filter_step import (
+    FilterOutcome,
+    RejectedTransfer,
+    contradiction_rule,
+    filter_step,
+    stack,
+)
+from lsu_mesh.mesh.estimation.inconsistency import Dropped
 from lsu_mesh.mesh.estimation.message_fields import described, finite_or_none, foretold
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
-from lsu_mesh.mesh.estimation.step_record import Combined, Status, Step
+from lsu_mesh.mesh.estimation.step_record import Combined, Step
 from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, Transfer
 from lsu_mesh.mesh.messages import (
-    Bounds,
     Fused,
     Input,
     Measurement,
     Message,
     Posterior,
     Prediction,
-    Reference,
     Suggestion,
     SupportMessage,
 )
-from lsu_mesh.mesh.nodes.estimator import WEAKNESS, About, Estimator
+from lsu_mesh.mesh.nodes.estimator import About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.sets import to_message
-
-
-@dataclass(frozen=True)
-class Brought:
-    """Transfers that were brought to a prediction, and their gain in nats."""
-
-    used: Sequence[Prediction | Fused] = ()
-    gain: float | None = None
-
-
-@dataclass(frozen=True)
-class Updated:
-    """What came of a data update, and the transfers that are still in the set."""
-
-    status: Status
-    brought: Brought = Brought()
-    cause: str | None = None
-    messages: Sequence[Message] = ()
 
 
 class FilterNode(Estimator):
@@ -64,20 +49,16 @@ class FilterNode(Estimator):
         self.settings = settings
         model = configuration.model(settings.sensors)
         super().__init__(configuration, name, boot, make_engine(settings, model, configuration.prior), settings.sensors)
-        self._rows: dict[str, slice] = {}
-        start = 0
-        for sensor in settings.sensors:
-            self._rows[sensor] = slice(start, start + len(configuration.sensors[sensor].C))
-            start = self._rows[sensor].stop
+        self._sensor_of_row = [sensor for sensor in settings.sensors for _ in configuration.sensors[sensor].C]
         self._inconsistent: set[int] = set()
         """Steps in a row, up to the current one, whose data contradicted the set."""
-        self._restart_search = RestartSearch(self.epochs)
+        self._restart_search = RestartSearch(self.held.epochs)
         self._is_tested = True
         """Whether data of a later step have agreed with the set of the mesh that the node started from."""
         self._started_at = 0
         self._transfer = Transfer(configuration, settings)
-        self._widened: float | None = None
-        """Factor by which r was widened in the current step."""
+        self._factor = 1.0
+        """By how much r was widened in the current step."""
         self._counts["transfers rejected"] = 0
         self._announced: Suggestion | None = None
         """Bounds that are adopted at a step to come."""
@@ -106,7 +87,7 @@ class FilterNode(Estimator):
         if isinstance(message, Suggestion):
             self._receive_bounds(message)
         elif isinstance(message, Prediction):
-            self.epochs.record(message)
+            self.held.epochs.record(message)
             self._transfer.record(message)
         elif isinstance(message, Posterior):
             self._receive_set(message)
@@ -117,7 +98,7 @@ class FilterNode(Estimator):
             self._announced = message
 
     def _receive_set(self, message: Posterior) -> None:
-        self.epochs.record(message)
+        self.held.epochs.record(message)
         if isinstance(message, Fused):
             if message.name in self.settings.transfer_from:
                 self._transfer.record(message)
@@ -126,7 +107,7 @@ class FilterNode(Estimator):
             self.take_candidate(message)
 
     def _receive_measurement(self, message: Measurement, now: int) -> list[Message]:
-        first = self.arrived(message.step, message.name)
+        first = self.timeline.arrived(message.step, message.name)
         if first is None:
             self.take(message.name, message, now)
         elif isinstance(first, Measurement) and first.y != message.y:
@@ -138,24 +119,26 @@ class FilterNode(Estimator):
     # -- one step
 
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
-        self._widened = None
+        self._factor = 1.0
         adopted = self._adopt(k, now)
-        y, used, origin = self._stack(step)
+        measured = self._measured(step)
+        y = stack(self.configuration, self.sources, measured)
         missing = [name for name in self.sources if name not in step.arrived]
+        used = [message for message in measured.values() if any(value is not None for value in message.y)]
+        origin = min((message.origin_ns for message in used), default=None)
         messages = [*adopted, *self._repair(k, y, now)]
-        if self.unsound:
-            return Combined("inconsistent", [], missing, origin, self.unsound), messages
-        before = self.engine.snapshot()
-        brought, told = self._bring_transfers(k, step, now)
-        updated = self._update(k, y, before, brought, now)
-        for message in updated.brought.used:
-            self.add_dependency(message)
+        if self.held.unsound:
+            return Combined("inconsistent", [], missing, origin, self.held.unsound), messages
+        outcome, told = self._update(k, step, y, now)
+        messages += told
+        if self.held.unsound:  # the data are not in the set: it is the one from before, of which nothing is believed
+            return Combined("inconsistent", [], missing, origin, str(outcome.error)), messages
+        for message in outcome.transfers:
+            self.held.add_dependency(message)
             if self._transfer.way == "data-predictor":
-                self.downgrade_guarantee("none")
-        transferred = [message.reference for message in updated.brought.used]
-        gain = updated.brought.gain
-        combined = Combined(updated.status, [*transferred, *used], missing, origin, updated.cause, gain)
-        return combined, [*messages, *told, *updated.messages]
+                self.held.downgrade_guarantee("none")
+        references = [message.reference for message in (*outcome.transfers, *used)]
+        return Combined(outcome.status, references, missing, origin, self._cause(outcome), outcome.gain), messages
 
     def _adopt(self, k: int, now: int) -> list[Message]:
         """Go by announced bounds from their step on: from the domain, in a new epoch, and never better than learned."""
@@ -163,71 +146,75 @@ class FilterNode(Estimator):
         if message is None or domain is None or not is_due(message, k):
             return []
         self._announced = None
-        self.engine = make_engine(self.settings, adopted_model(self.configuration, self.settings, message), domain)
-        self.best_guarantee = max(self.best_guarantee, "learned", key=WEAKNESS.index)
-        self.reach.lose()
+        model = adopted_model(self.configuration, self.settings, message)
+        self.held.adopt(make_engine(self.settings, model, domain))
         self._restart_search.forget()
         self._inconsistent.clear()
         self.abandon_epoch("")
-        self.start_from("domain", [message.reference])
+        self.start_from("domain", (message.reference,))
         text = f"step {k}: adopted the bounds that {message.src} found; started again from the domain"
-        about: About = {"step": k, "epoch": self.epochs.number, "source": message.src, "factor": message.factor}
+        about: About = {"step": k, "epoch": self.held.epochs.number, "source": message.src, "factor": message.factor}
         return [self.event("WARN", "bounds-adopted", text, now, k, about)]
 
-    def _stack(self, step: Step) -> tuple[Vector, list[Reference], int | None]:
-        """Measured outputs by sensor name, then row, NaN where missing; what was used; the oldest sending time."""
-        y = np.full(self.engine.model.output_count, np.nan)
-        used, origins = [], []
-        for name in self.sources:
-            message = step.arrived.get(name)
-            if not isinstance(message, Measurement):
-                continue
-            values = [np.nan if value is None else value for value in message.y]
-            y[self._rows[name]] = values
-            if not np.isnan(values).all():
-                used.append(message.reference)
-                origins.append(message.origin_ns)
-        return y, used, min(origins) if origins else None
+    def _measured(self, step: Step) -> dict[str, Measurement]:
+        """What the sensors have sent of a step, in the order of their names."""
+        arrived = {name: step.arrived.get(name) for name in self.sources}
+        return {name: message for name, message in arrived.items() if isinstance(message, Measurement)}
 
-    def _bring_transfers(self, k: int, step: Step, now: int) -> tuple[Brought, list[Message]]:
-        """Condition the prediction on what others know."""
+    def _update(self, k: int, step: Step, y: Vector, now: int) -> tuple[FilterOutcome, list[Message]]:
+        """The step's transfers and data, and what the node does where they contradict the set."""
+        inputs, is_replay = self.timeline.inputs, step.transfers is not None
+        before = self.engine.snapshot()
+        outcome = filter_step(
+            self.engine,
+            y,
+            self._transfers(k, step, inputs),
+            lambda message: self._transfer.as_set(message, k, self.engine, inputs),
+            contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse",
+        )
+        # a transfer that misses the set was told of when the step was first done
+        rejected = [one for one in outcome.rejected if one.by_data or not is_replay]
+        messages = [self._transfer_event(k, one, now) for one in rejected]
+        if outcome.error is None:
+            if outcome.status == "ok":
+                self._agree(k)
+            return outcome, messages
+        self._counts["contradictions"] += 1
+        if not self._is_tested:
+            self.engine.restore(before)
+            return replace(outcome, transfers=(), gain=None), [*messages, *self._refuse_start(k, y, outcome.error, now)]
+        if outcome.dropped is None:
+            self._factor = outcome.factor
+            self.held.downgrade_guarantee("learned")
+            return outcome, [*messages, self._widened_event(k, outcome.error, now)]
+        epoch = self.held.epochs.number
+        messages += self._drop(k, y, outcome.dropped, now)
+        if epoch != self.held.epochs.number:
+            outcome = replace(outcome, transfers=(), gain=None)
+        return outcome, messages
+
+    def _transfers(self, k: int, step: Step, inputs: Mapping[int, Input]) -> list[Prediction | Fused]:
+        """What others know of the step, chosen when it was first done; nothing of an abandoned epoch."""
         if self._transfer.way == "off":
-            return Brought(), []
-        inputs, is_replay = self.inputs(), step.transfers is not None
+            return []
         if step.transfers is None:
             has_inputs = self.engine.model.input_count > 0
-            step.transfers = self._transfer.available(k, inputs, self.epochs, needs_inputs=has_inputs)
+            step.transfers = self._transfer.available(k, inputs, self.held.epochs, needs_inputs=has_inputs)
             self._transfer.forget_before(k - MAX_BOX_AGE)
-        used: list[Prediction | Fused] = []
-        gain = 0.0
-        messages: list[Message] = []
-        for message in step.transfers:
-            if self.epochs.is_abandoned(message):
-                continue
-            try:
-                gain += self.engine.condition(self._transfer.as_set(message, k, self.engine, inputs))
-            except InconsistentData as error:
-                if not is_replay:
-                    messages.append(self._transfer_event(k, message, error, now))
-                continue
-            used.append(message)
-        return Brought(used, gain if used else None), messages
+        return [message for message in step.transfers if not self.held.epochs.is_abandoned(message)]
 
-    def _transfer_event(self, k: int, message: Message, why: object, now: int) -> Message:
+    def _transfer_event(self, k: int, rejected: RejectedTransfer, now: int) -> Message:
         self._counts["transfers rejected"] += 1
-        text = f"step {k}: the transfer from {message.src} was left out: {why}"
-        return self.event("WARN", "transfer-rejected", text, now, k, {"source": message.src, "step": k})
+        source = rejected.message.src
+        text = f"step {k}: the transfer from {source} was left out: {rejected.reason}"
+        return self.event("WARN", "transfer-rejected", text, now, k, {"source": source, "step": k})
 
-    def _update(self, k: int, y: Vector, before: object, brought: Brought, now: int) -> Updated:
-        """Data update; ``before`` is the set without the transfers, which give way where they alone contradict y."""
-        if np.isnan(y).all():
-            return Updated("predicted", brought)
-        try:
-            self.engine.update(y)
-        except InconsistentData as error:
-            return self._contradiction(k, y, before, brought, error, now)
-        self._agree(k)
-        return Updated("ok", brought)
+    @staticmethod
+    def _cause(outcome: FilterOutcome) -> str | None:
+        if outcome.error is None:
+            return None
+        is_widened = outcome.status == "ok"
+        return f"{outcome.error}; r widened by {outcome.factor:.6g}" if is_widened else str(outcome.error)
 
     def _agree(self, k: int) -> None:
         self._inconsistent.clear()
@@ -235,54 +222,20 @@ class FilterNode(Estimator):
 
     # -- contradictions
 
-    def _contradiction(
-        self, k: int, y: Vector, before: object, brought: Brought, error: InconsistentData, now: int
-    ) -> Updated:
-        """What is done when the data are proved to miss the set."""
-        if brought.used and self._agrees_without_transfers(y, before):
-            self._agree(k)
-            why = "it contradicts the data"
-            return Updated("ok", messages=[self._transfer_event(k, message, why, now) for message in brought.used])
-        self._counts["contradictions"] += 1
-        if not self._is_tested:
-            return Updated("inconsistent", cause=str(error), messages=self._refuse_start(k, y, error, now))
-        if self.settings.on_inconsistency == "widen":
-            self._widened = widen(self.engine, y)
-            if self._widened is not None:
-                self.downgrade_guarantee("learned")
-                cause = f"{error}; r widened by {self._widened:.6g}"
-                return Updated("ok", brought, cause, [self._widened_event(k, error, now)])
-        epoch = self.epochs.number
-        messages = self._drop(k, y, now)
-        return Updated("inconsistent", brought if epoch == self.epochs.number else Brought(), str(error), messages)
-
-    def _agrees_without_transfers(self, y: Vector, before: object) -> bool:
-        """Update the set as it was before the transfers; False, and as it was after them, where y misses that too."""
-        after = self.engine.snapshot()
-        self.engine.restore(before)
-        try:
-            self.engine.update(y)
-        except InconsistentData:
-            self.engine.restore(after)
-            return False
-        return True
-
     def _widened_event(self, k: int, error: InconsistentData, now: int) -> Message:
-        text = f"step {k}: {error}; r was widened by {self._widened:.4g} in this step, the set is no longer guaranteed"
-        return self.event("WARN", "widened", text, now, k, {"step": k, "factor": self._widened})
+        text = f"step {k}: {error}; r was widened by {self._factor:.4g} in this step, the set is no longer guaranteed"
+        return self.event("WARN", "widened", text, now, k, {"step": k, "factor": self._factor})
 
-    def _drop(self, k: int, y: Vector, now: int) -> list[Message]:
-        """Leave out what contradicts the prediction; reset when it goes on."""
+    def _drop(self, k: int, y: Vector, dropped: Dropped, now: int) -> list[Message]:
+        """Tell what was left out because it contradicts the prediction; reset when it goes on."""
         self._inconsistent.add(k)
-        dropped = update_without_contradicting_strips(self.engine, y)
         messages = [self._dropped_event(k, row, y, dropped, now) for row in (*dropped.alone, *dropped.together)]
         if self.settings.on_inconsistency == "reset" and len(self._inconsistent) >= self.settings.reset_after:
             messages.append(self._reset(k, y, now))
         return messages
 
     def _dropped_event(self, k: int, row: int, y: Vector, dropped: Dropped, now: int) -> Message:
-        sensor = next(name for name, rows in self._rows.items() if rows.start <= row < rows.stop)
-        output, gap = self.engine.model.outputs[row], dropped.gap(row, y)
+        sensor, output, gap = self._sensor_of_row[row], self.engine.model.outputs[row], dropped.gap(row, y)
         lower, upper = float(dropped.band.lower[row]), float(dropped.band.upper[row])
         is_alone = row in dropped.alone
         if is_alone:
@@ -306,7 +259,7 @@ class FilterNode(Estimator):
             self._hold(start)
             self.engine.update(y)
             text = f"step {k}: {count} steps in a row contradicted the set; started again from {start.words}"
-            return self.event("ERROR", "reset", text, now, k, {"step": k, "epoch": self.epochs.number})
+            return self.event("ERROR", "reset", text, now, k, {"step": k, "epoch": self.held.epochs.number})
         text = (
             f"step {k}: {count} steps in a row contradicted the set and there is nothing sound to "
             "start again from; give the model a domain, or check the declared bounds"
@@ -317,42 +270,43 @@ class FilterNode(Estimator):
         """The set that the node started from misses the first data: it was not sound."""
         self._is_tested = True
         event = self._abandon(k, y, f"the set that it started from contradicts the data: {error}", {}, now)
-        if not self.unsound:
+        if not self.held.unsound:
             self.engine.update(y)
         return [event]
 
     def _repair(self, k: int, y: Vector, now: int) -> list[Message]:
         """Leave an epoch that a source has abandoned; where there was nothing sound to start from, look again."""
-        source = self.epochs.abandoned
+        source = self.held.epochs.abandoned
         if source is not None:
             return [self._abandon(k, y, f"{source} has abandoned its epoch", {"source": source}, now)]
-        start = self._start_again(k, y, abandons=False) if self.unsound else None
+        start = self._start_again(k, y, abandons=False) if self.held.unsound else None
         if start is None:
             return []
         self._hold(start)
         text = f"step {k}: started again from {start.words}"
-        return [self.event("INFO", "found-start", text, now, k, {"step": k, "epoch": self.epochs.number})]
+        return [self.event("INFO", "found-start", text, now, k, {"step": k, "epoch": self.held.epochs.number})]
 
     def _abandon(self, k: int, y: Vector, why: str, about: About, now: int) -> Message:
         """A new epoch at once, so that others learn of it; held is something sound, or nothing that may be believed."""
         start = self._start_again(k, y, abandons=True)
         self.abandon_epoch(f"{why}; there is nothing sound to start again from")
-        about = about | {"step": k, "epoch": self.epochs.number}
+        about = about | {"step": k, "epoch": self.held.epochs.number}
         if start is None:
-            return self.event("ERROR", "epoch-lost", f"step {k}: {self.unsound}", now, k, about)
+            return self.event("ERROR", "epoch-lost", f"step {k}: {self.held.unsound}", now, k, about)
         self._hold(start)
         text = f"step {k}: {why}; started again from {start.words}"
         return self.event("WARN", "epoch-left", text, now, k, about)
 
     def _hold(self, start: Start) -> None:
         self.engine.restore(start.set)
-        self.start_from(start.base, start.used)
+        self.start_from(start.base, tuple(start.used))
         if start.message is not None:
-            self.add_dependency(start.message)
+            self.held.add_dependency(start.message)
 
     def _start_again(self, k: int, y: Vector, *, abandons: bool) -> Start | None:
         """A set of step k, before its data, that is sound and meets them; ``None`` where there is none."""
-        return self._restart_search.find(self.engine, k, y, self.reach.box, self.inputs(), abandons=abandons)
+        inputs = self.timeline.inputs
+        return self._restart_search.find(self.engine, k, y, self.held.reach, inputs, abandons=abandons)
 
     def _start_from_candidate(self) -> bool:
         if not super()._start_from_candidate():
@@ -364,6 +318,7 @@ class FilterNode(Estimator):
     # -- messages out
 
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
+        held = self.held
         return Posterior(
             **self.stamp("posterior", k, now, combined.origin),
             **described(self.engine),
@@ -371,29 +326,33 @@ class FilterNode(Estimator):
             support=support,
             status=combined.status,
             revision=step.revision,
-            epoch=self.epochs.number,
-            descent=self.epochs.descent,
-            guarantee=self.guarantee,
-            base=self._base,
+            epoch=held.epochs.number,
+            descent=held.descent,
+            guarantee=held.guarantee,
+            base=held.base,
             used=list(combined.used),
-            bounds=self._bounds_in_force(),
+            bounds=self.noise_bounds(self._factor),
             missing=list(combined.missing),
             cause=combined.cause,
             gain=None if combined.gain is None else finite_or_none(combined.gain),
+            algorithm=self.engine.algorithm,
         )
 
-    def _bounds_in_force(self) -> Bounds:
-        rho, r = self.engine.half_widths
-        return Bounds(rho=rho.tolist(), r=(r * (self._widened or 1.0)).tolist())
-
     def prediction(self, k: int, now: int) -> list[Message]:
+        held = self.held
+        is_input_known = self.timeline.has_input(k - 1) or not self.engine.model.input_count
         return [
             Prediction(
                 **self.stamp("prediction", k, now),
                 **foretold(self.engine),
                 support=to_message(self.engine.support),
-                epoch=self.epochs.number,
-                descent=self.epochs.descent,
-                guarantee=self.guarantee,
+                epoch=held.epochs.number,
+                descent=held.descent,
+                guarantee=held.guarantee,
+                base=held.base,
+                used=list(held.used),
+                bounds=self.noise_bounds(),
+                missing=[] if is_input_known else ["input"],
+                algorithm=self.engine.algorithm,
             )
         ]

@@ -2,58 +2,38 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from typing import assert_never
 
-import numpy as np
-
-from lsu_mesh.array_types import Vector
-from lsu_mesh.errors import InconsistentData
-from lsu_mesh.filters.lsucz import LSUCZ
-from lsu_mesh.fusion.fuse import fuse
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.estimation.fusion_step import (
+    ABANDONED,
+    OUTVOTED,
+    FusionOutcome,
+    Source,
+    family_step,
+    fused_guarantee,
+    fusion_algorithm,
+    fusion_engine,
+    fusion_step,
+)
 from lsu_mesh.mesh.estimation.message_fields import described_box
 from lsu_mesh.mesh.estimation.quarantine import Quarantine, Say
 from lsu_mesh.mesh.estimation.step_record import Combined, Status, Step
 from lsu_mesh.mesh.estimation.transfer import SOUND
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
-from lsu_mesh.mesh.nodes.estimator import START_GRACE, WEAKNESS, About, Estimator
+from lsu_mesh.mesh.nodes.estimator import START_GRACE, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint
-from lsu_mesh.mesh.sets import to_support
-from lsu_mesh.supports.support import Support
 
-MAX_FAMILIES = 64
-"""So many families of contradicting sources are tried, the largest first, to find out whom to leave out."""
 FAR_BEHIND_S, FAR_BEHIND = 2.0, 256
 """So far behind, in time at the mesh's rate and in steps, and a fusion goes on where its sources are."""
+CONTRADICTION = "sources contradict one another"
+DISJOINT = "own prediction was disjoint from what the sources agree on"
+"""Causes of what is no plain step."""
 SILENT_STEPS = 5
 """After so many steps without any message, a second at least, the fusion goes on by the clock."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """One filter's set of a step."""
-
-    name: str
-    message: Posterior
-    support: Support
-
-    @property
-    def bounds(self) -> tuple[Vector, Vector]:
-        """The bounds that the filter published."""
-        return np.array(self.message.lower), np.array(self.message.upper)
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What came of a step's sources."""
-
-    status: Status
-    used: Sequence[Source]
-    cause: str | None = None
-    messages: list[Message] = field(default_factory=list)
 
 
 class FusionNode(Estimator):
@@ -66,15 +46,9 @@ class FusionNode(Estimator):
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         self.settings = configuration.fusion[name]
-        engine = LSUCZ(
-            configuration.base_model,
-            configuration.prior,
-            max_generators=self.settings.max_generators,
-            max_constraints=self.settings.max_constraints,
-        )
+        self._policy = POLICIES[self.settings.policy]
+        engine = fusion_engine(configuration, self.settings)
         super().__init__(configuration, name, boot, engine, self.settings.sources)
-        self._met: tuple[Vector, Vector] = engine.bounds()
-        """Bounds of the set met with those of every accepted source."""
         self._rejected: list[Rejection] = []
         self._quarantine = Quarantine(self.sources, self.settings.quarantine_after, self.settings.max_lag)
         self._reported: set[tuple[int, str]] = set()
@@ -104,16 +78,16 @@ class FusionNode(Estimator):
 
     def _receive_posterior(self, message: Posterior, now: int) -> None:
         name = message.name
-        self.epochs.record(message)
+        self.held.epochs.record(message)
         known = self.last.get(name)
-        if known is not None and self.epochs.is_abandoned(known):
+        if known is not None and self.held.epochs.is_abandoned(known):
             del self.last[name]
             known = None
-        if self.epochs.is_abandoned(message):
+        if self.held.epochs.is_abandoned(message):
             return
         if message.status in SOUND and (known is None or message.step >= known.step):
             self.last[name] = message
-        old = self.arrived(message.step, name)
+        old = self.timeline.arrived(message.step, name)
         if old is None or old.boot != message.boot or old.seq < message.seq:
             self.take(name, message, now)
 
@@ -123,10 +97,10 @@ class FusionNode(Estimator):
 
     def _skip_ahead(self, now: int) -> list[Message]:
         """Far behind, join the sources where they are, like a fusion that starts late; what they know is enough."""
-        if self.current is None or self._step_arrivals.newest - self.current <= self._far_behind:
+        if self.current is None or self.timeline.arrivals.newest - self.current <= self._far_behind:
             return []
-        first = self._step_arrivals.newest - self.history
-        if not any(self._is_start(k) for k in self._steps if k >= first):
+        first = self.timeline.arrivals.newest - self.history
+        if not any(self._is_start(k) for k, _ in self.timeline.steps() if k >= first):
             return []
         skipped, k = first - self.current, self.current
         self.join_again(first, now - START_GRACE)
@@ -136,15 +110,16 @@ class FusionNode(Estimator):
 
     def _sense_silence(self, now: int) -> None:
         """When nothing at all has come for a while, steps go on by the clock; the set then grows, honestly."""
-        if self.current is None or self._step_arrivals.heard_at is None or self.waiting_for():
+        arrivals = self.timeline.arrivals
+        if self.current is None or arrivals.heard_at is None or self.waiting_for():
             return
         period = SECOND / self.configuration.mesh.rate
         silence = max(SECOND, int(SILENT_STEPS * period)) + self.deadline
         last = self.configuration.mesh.steps
-        while now - self._step_arrivals.heard_at > silence and (last is None or self._step_arrivals.newest < last):
-            heard_at = self._step_arrivals.heard_at + int(period)
-            self._see(self._step_arrivals.newest + 1, now)
-            self._step_arrivals.heard_at = heard_at
+        while now - arrivals.heard_at > silence and (last is None or arrivals.newest < last):
+            heard_at = arrivals.heard_at + int(period)
+            self.timeline.see(arrivals.newest + 1, now)
+            arrivals.heard_at = heard_at
             self._counts["silent steps"] += 1
 
     # -- fusion of one step
@@ -152,37 +127,68 @@ class FusionNode(Estimator):
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
         self._rejected = []
         sources = [] if self._passes_over() else self._sound_sources(step)
-        abandoned = self._leave_abandoned_epoch(k, now)
+        messages = self._leave_abandoned_epoch(k, now)
         missing = [name for name in self.sources if name not in step.arrived]
-        self._met = self.engine.bounds()
-        if self.settings.policy == "relaxed" and len(sources) > self.settings.faults:
-            outcome = self._relaxed(k, sources, now)
-        elif self.settings.policy == "intersect" and sources:
-            outcome = self._intersected(k, sources, now)
-        elif not self.unsound or self._start_without_sources():
-            outcome = Outcome("predicted", [])
-        else:
-            outcome = Outcome("inconsistent", [], self.unsound)
-        self.engine.resume(self.engine.support, *self._met)  # what is published is all that the next step depends on
-        agreeing = sources if outcome.status != "inconsistent" else []
-        messages = [*abandoned, *outcome.messages, *self._record_rejected(k, agreeing, now)]
+        has_prediction = not self.held.unsound
+        outcome = fusion_step(self.engine, sources, self._policy, self.settings.faults, has_prediction=has_prediction)
+        if (
+            self._policy.is_intersection
+            and outcome.basis == "contradiction"
+            and self.start_without_data(k, abandons=False)
+        ):
+            outcome = family_step(self.engine, sources)
+        status, cause, told = self._conclude(k, outcome, now)
+        messages += told
+        agreeing = sources if status != "inconsistent" else []
+        messages += self._record_rejected(k, agreeing, now)
         self._add_dependencies(outcome.used)
         origin = min((source.message.origin_ns for source in outcome.used), default=None)
         used = [source.message.reference for source in outcome.used]
-        return Combined(outcome.status, used, missing, origin, outcome.cause), messages
+        return Combined(status, used, missing, origin, cause), messages
 
     def _passes_over(self) -> bool:
         """Far behind, a step is only predicted through: nobody is told of it, and later sources know what it knew."""
-        return self._is_behind() and not self.unsound and self.epochs.abandoned is None
+        return self.timeline.is_behind() and not self.held.unsound and self.held.epochs.abandoned is None
+
+    def _conclude(self, k: int, outcome: FusionOutcome, now: int) -> tuple[Status, str | None, list[Message]]:
+        """What is said of a step: its status, the cause where it is not a plain one, and events."""
+        match outcome.basis:
+            case "both":
+                return "ok", None, self._name_rejected(k, outcome.rejected, now)
+            case "sources":
+                messages = self._name_rejected(k, outcome.rejected, now)
+                cause, told = self._without_prediction(k, now)
+                return "restarted", cause, [*messages, *told]
+            case "family":
+                self.held.downgrade_guarantee("learned")
+                status: Status = "ok" if outcome.used else "inconsistent"
+                return status, CONTRADICTION, self._name_rejected(k, outcome.rejected, now)
+            case "prediction":
+                if self.held.unsound and not self.start_without_data(k, abandons=False):
+                    return "inconsistent", self.held.unsound, []
+                self.engine.resume(self.engine.support, *self.engine.bounds())
+                return "predicted", None, []
+            case "contradiction":
+                return self._contradiction(k, now)
+            case _:
+                assert_never(outcome.basis)
+
+    def _contradiction(self, k: int, now: int) -> tuple[Status, str, list[Message]]:
+        """The sources contradict one another, and nothing of them is used."""
+        if self._policy.is_intersection:
+            return "inconsistent", f"{CONTRADICTION}, and {self.held.unsound}", []
+        cause = f"more than {self.settings.faults} of the sources contradict one another"
+        about: About = {"step": k, "faults": self.settings.faults}
+        return "inconsistent", cause, [self.event("ERROR", "too-many-faults", f"step {k}: {cause}", now, k, about)]
 
     def _add_dependencies(self, used: Sequence[Source]) -> None:
         """No single source carries a relaxed set: of those that are learned, or abandoned, ``faults`` may be wrong."""
-        if self.settings.policy == "intersect":
+        if self._policy.is_intersection:
             for source in used:
-                self.add_dependency(source.message)
+                self.held.add_dependency(source.message)
         elif used:
-            guarantees = sorted((source.message.guarantee for source in used), key=WEAKNESS.index, reverse=True)
-            self.downgrade_guarantee(guarantees[min(self.settings.faults, len(guarantees) - 1)])
+            guarantees = [source.message.guarantee for source in used]
+            self.held.downgrade_guarantee(fused_guarantee(guarantees, self.settings.faults))
 
     def _sound_sources(self, step: Step) -> list[Source]:
         sources = []
@@ -190,150 +196,61 @@ class FusionNode(Estimator):
             message = step.arrived.get(name)
             if not isinstance(message, Posterior):
                 continue
-            if self.epochs.is_abandoned(message):
-                self._rejected.append(Rejection(source=name, reason="descends from an epoch that was abandoned"))
+            if self.held.epochs.is_abandoned(message):
+                self._rejected.append(Rejection(source=name, reason=ABANDONED))
             elif message.status in SOUND:
-                sources.append(Source(name, message, to_support(message.support)))
+                sources.append(Source.of(message))
             else:
                 self._rejected.append(Rejection(source=name, reason=f"status {message.status}"))
         return sources
 
-    def _intersected(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
-        """Every source with the own prediction; without the prediction where only that is wrong."""
-        before, met = self.engine.snapshot(), self._met
-        if not self.unsound and self._try_all(sources):
-            return Outcome("ok", sources, None, self._name_rejected(k, [], now))
-        self.engine.restore(before)
-        if self._restart(sources):
-            return self._without_prediction(k, sources, now)
-        self.engine.restore(before)
-        self._met = met
-        cause = "sources contradict one another"
-        if self.unsound and not self._start_without_sources():
-            return Outcome("inconsistent", [], f"{cause}, and {self.unsound}")
-        accepted = self._largest_family(sources)
-        self.downgrade_guarantee("learned")
-        messages = self._name_rejected(k, [source for source in sources if source not in accepted], now)
-        return Outcome("ok" if accepted else "inconsistent", accepted, cause, messages)
-
-    def _relaxed(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
-        """What holds the state as long as at most ``faults`` of the sources are wrong."""
-        try:
-            together = fuse([source.support for source in sources], "relaxed", self.settings.faults)
-        except InconsistentData:
-            cause = f"more than {self.settings.faults} of the sources contradict one another"
-            about: About = {"step": k, "faults": self.settings.faults}
-            event = self.event("ERROR", "too-many-faults", f"step {k}: {cause}", now, k, about)
-            return Outcome("inconsistent", [], cause, [event])
-        messages = self._name_rejected(k, [sources[i] for i in together.rejected], now)
-        if not self.unsound and self._meet(together.support, together.bounds):
-            return Outcome("ok", sources, None, messages)
-        self.engine.reset(together.support)
-        self._met = together.bounds
-        outcome = self._without_prediction(k, sources, now)
-        return Outcome(outcome.status, outcome.used, outcome.cause, [*messages, *outcome.messages])
-
-    def _without_prediction(self, k: int, sources: Sequence[Source], now: int) -> Outcome:
+    def _without_prediction(self, k: int, now: int) -> tuple[str, list[Message]]:
         """The engine holds what the sources say alone: a new epoch begins, unless nothing was held before."""
-        cause = self.unsound or "own prediction was disjoint from what the sources agree on"
-        if self.unsound:
+        if self.held.unsound:
+            cause = self.held.unsound
             self.start_from("sources")
-            return Outcome("restarted", sources, cause)
-        self.begin_epoch("sources")
-        event = self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now, k, {"step": k})
-        return Outcome("restarted", sources, cause, [event])
+            return cause, []
+        self.abandon_epoch("")
+        self.start_from("sources")
+        return DISJOINT, [self._dropped_event(k, DISJOINT, now)]
 
     def _leave_abandoned_epoch(self, k: int, now: int) -> list[Message]:
         """When a source abandons an epoch that went into the set, the fusion leaves its own at once, and says so."""
-        source = self.epochs.abandoned
+        source = self.held.epochs.abandoned
         if source is None:
             return []
         self.abandon_epoch(f"{source} has abandoned its epoch")
-        event = self.event("ERROR", "prediction-dropped", f"step {k}: {self.unsound}", now, k, {"step": k})
-        return [event]
+        return [self._dropped_event(k, self.held.unsound, now)]
 
-    def _start_without_sources(self) -> bool:
-        """Hold the prior carried through all inputs, or the domain; False where neither is known."""
-        start = self.start_without_data()
-        if start is None:
-            return False
-        self.engine.reset(start[0])
-        self._met = self.engine.bounds()
-        self.start_from(start[1])
-        return True
+    def _dropped_event(self, k: int, cause: str, now: int) -> Message:
+        about: About = {"step": k, "epoch": self.held.epochs.number}
+        return self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now, k, about)
 
     def _start_from_candidate(self) -> bool:
         """A fusion that starts late takes what its sources say together of a step, once enough of them are there."""
-        for k in sorted(self._steps, reverse=True):
+        for k, _ in reversed(self.timeline.steps()):
             if self._is_start(k):
-                self._begin(k, self.configuration.prior, "prior", restarted=True)
-                self.unsound = "started late"
+                self._begin(k, self.configuration.prior, "prior")
+                self.held.unsound = "started late"
                 return True
         return False
 
     def _is_start(self, k: int) -> bool:
         """Whether enough sources of step k are there to hold the state by themselves, and its input."""
-        enough = self.settings.faults + 1 if self.settings.policy == "relaxed" else 1
-        return len(self._sound_sources(self._steps[k])) >= enough and not self._input_missing(k)
-
-    def _try_all(self, sources: Sequence[Source]) -> bool:
-        return all(self._try(source) for source in sources)
-
-    def _try(self, source: Source) -> bool:
-        """Meet the set with one source; False, and unchanged, where the intersection is proved empty."""
-        return self._meet(source.support, source.bounds)
-
-    def _meet(self, support: Support, bounds: tuple[Vector, Vector]) -> bool:
-        """Meet the set with another one; False, and unchanged, where the intersection is proved empty."""
-        lower, upper = np.maximum(self._met[0], bounds[0]), np.minimum(self._met[1], bounds[1])
-        if (lower > upper).any():
-            return False
-        before = self.engine.snapshot()
-        try:
-            self.engine.condition(support)
-        except InconsistentData:
-            return False
-        own_lower, own_upper = self.engine.bounds()
-        lower, upper = np.maximum(lower, own_lower), np.minimum(upper, own_upper)
-        if (lower > upper).any():
-            self.engine.restore(before)
-            return False
-        self._met = (lower, upper)
-        return True
-
-    def _largest_family(self, sources: Sequence[Source]) -> Sequence[Source]:
-        """Meet the set with as many sources as have a point in common with it, the first by name of equal size."""
-        before, met = self.engine.snapshot(), self._met
-        families = (f for size in range(len(sources) - 1, 0, -1) for f in itertools.combinations(sources, size))
-        for family in itertools.islice(families, MAX_FAMILIES):
-            if self._try_all(family):
-                return family
-            self.engine.restore(before)
-            self._met = met
-        return [source for source in sources if self._try(source)]
-
-    def _restart(self, sources: Sequence[Source]) -> bool:
-        """Drop the own prediction and hold what the sources alone say; False where they contradict one another."""
-        first, *others = sources
-        try:
-            self.engine.reset(first.support)
-        except InconsistentData:  # the source's own set is empty: it agrees with nobody
-            return False
-        self._met = first.bounds
-        return self._try_all(others)
+        enough = self._policy.sources_needed(self.settings.faults)
+        return len(self._sound_sources(self.timeline.step(k))) >= enough and not self._input_missing(k)
 
     def _name_rejected(self, k: int, rejected: Sequence[Source], now: int) -> list[Message]:
         """Events and counts of the sources that contradict the others."""
         messages: list[Message] = []
         self._reported = {(step, name) for step, name in self._reported if step >= k - self.history}
         for name in sorted(source.name for source in rejected):
-            reason = "contradicts what the other sources and the own prediction agree on"
-            self._rejected.append(Rejection(source=name, reason=reason))
+            self._rejected.append(Rejection(source=name, reason=OUTVOTED))
             if (k, name) in self._reported:
                 continue
             self._reported.add((k, name))
             self._counts["contradictions"] += 1
-            text = f"step {k}: {name} {reason}; left out"
+            text = f"step {k}: {name} {OUTVOTED}; left out"
             messages.append(self.event("WARN", "source-rejected", text, now, k, {"source": name, "step": k}))
         return messages
 
@@ -361,26 +278,27 @@ class FusionNode(Estimator):
 
     # -- messages out
 
-    def published_bounds(self) -> tuple[Vector, Vector]:
-        return self._met
+    def content(self) -> tuple[object, ...]:
+        return (self._rejected,)
 
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
         return Fused(
             **self.stamp("fused", k, now, combined.origin),
-            **described_box(*self._met),
+            **described_box(*self.engine.bounds()),
             kind="fusion",
             support=support,
             status=combined.status,
             revision=step.revision,
-            epoch=self.epochs.number,
-            descent=self.epochs.descent,
-            guarantee=self.guarantee,
-            base=self._base,
+            epoch=self.held.epochs.number,
+            descent=self.held.descent,
+            guarantee=self.held.guarantee,
+            base=self.held.base,
             used=list(combined.used),
             bounds=self.noise_bounds(),
             missing=list(combined.missing),
             cause=combined.cause,
-            policy=self.settings.policy,  # type: ignore[arg-type]
+            algorithm=fusion_algorithm(self._policy),
+            policy=self._policy.name,
             faults=self.settings.faults,
             rejected=self._rejected,
             quarantined=sorted(self._quarantine.members),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import assert_never
 
 import numpy as np
 
@@ -58,16 +59,20 @@ class SimulatedSensorNode(Node):
         return y
 
     def _with_fault(self, fault: SensorFault, k: int, y: Vector) -> Vector:
-        if fault.kind == "bias":
-            return y + fault.size
-        if fault.kind == "drift":
-            return y + fault.size * (k - fault.first + 1)
-        if fault.kind == "stuck":
-            return self._stuck.setdefault(fault, y)
-        if fault.kind == "random":
-            noise = random_uniform(self.configuration.mesh.seed, f"{self.name}/fault", k, len(y))
-            return y + fault.size * noise
-        return np.full(len(y), math.nan)  # lost
+        match fault.kind:
+            case "bias":
+                return y + fault.size
+            case "drift":
+                return y + fault.size * (k - fault.first + 1)
+            case "stuck":
+                return self._stuck.setdefault(fault, y)
+            case "random":
+                noise = random_uniform(self.configuration.mesh.seed, f"{self.name}/fault", k, len(y))
+                return y + fault.size * noise
+            case "lost":
+                return np.full(len(y), math.nan)
+            case _:
+                assert_never(fault.kind)
 
     def advance(self, now: int) -> list[Message]:
         return []

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from lsu_mesh.mesh.messages import Message, read
+from lsu_mesh.mesh.admission import Admission
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.messages import TYPES, Message, read
+from lsu_mesh.mesh.simulator.broken import InvariantBroken
 
 MAX_KNOWN = 4096
 
@@ -22,3 +25,20 @@ class SharedDecoder:
                 self._known.clear()
             self._known[topic, payload] = found
         return found
+
+
+class Reader:
+    """Reads everything that is published as a receiver would: what it refuses no receiver would ever get."""
+
+    def __init__(self, configuration: Configuration, decoder: SharedDecoder) -> None:
+        self._admission = Admission(configuration, TYPES)
+        self._admission.decoder = decoder.read
+
+    def read(self, key: str, payload: bytes) -> Message:
+        """The message as it comes out of its bytes; raises :class:`InvariantBroken` where it is refused."""
+        duplicates = self._admission.duplicates
+        message = self._admission.admit(key, payload)
+        if message is None:
+            why = "published twice" if self._admission.duplicates > duplicates else self._admission.last_refusal
+            raise InvariantBroken("decoding", f"{key}: {why}")
+        return message

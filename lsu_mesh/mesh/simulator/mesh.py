@@ -17,7 +17,7 @@ from lsu_mesh.mesh.nodes.node import SECOND, Node
 from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
-from lsu_mesh.mesh.simulator.decoding import SharedDecoder
+from lsu_mesh.mesh.simulator.decoding import Reader, SharedDecoder
 from lsu_mesh.mesh.simulator.faults import FaultPlan, Skew
 from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
@@ -136,8 +136,9 @@ class Process:
 
     def _publish(self, messages: Sequence[Message], at: int) -> None:
         for message in messages:
-            self._mesh.witness.published(self.node, message)
-            self._mesh.spread(self, self.node.key(message), encode(message), at)
+            key, payload = self.node.key(message), encode(message)
+            self._mesh.witness.published(self.node, self._mesh.reader.read(key, payload))
+            self._mesh.spread(self, key, payload, at)
 
 
 class SimulatedMesh:
@@ -156,6 +157,7 @@ class SimulatedMesh:
         self._rng = rng
         self._boots = 0
         self._decoder = SharedDecoder()
+        self.reader = Reader(configuration, self._decoder)
         self._listeners: dict[str, list[str]] = {}
         for role, name in configuration.peers():
             self._begin(role, name)

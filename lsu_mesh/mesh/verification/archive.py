@@ -6,10 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable
 from typing import TypeVar
 
-import numpy as np
-
-from lsu_mesh.array_types import Vector
-from lsu_mesh.mesh.messages import Input, Message, Posterior, Prediction, Reference, Truth
+from lsu_mesh.mesh.messages import Input, Measurement, Message, Posterior, Prediction, Reference, Truth
 
 Kind = TypeVar("Kind", bound=Message)
 
@@ -36,6 +33,8 @@ class Archive:
         self.inputs: dict[int, Input] = {}
         """The first input of each step."""
         self.truth: dict[int, list[float]] = {}
+        self._by_name: defaultdict[tuple[str, int], list[Message]] = defaultdict(list)
+        """Measurements, posteriors and fused sets by the name of their peer and their step."""
         self._posteriors: defaultdict[tuple[str, str, int], list[Posterior]] = defaultdict(list)
         for message in messages:
             if message.reference not in self._messages:
@@ -49,6 +48,25 @@ class Archive:
             self.truth.setdefault(message.step, message.x)
         elif isinstance(message, Posterior):
             self._posteriors[message.src, message.boot, message.step].append(message)
+        if isinstance(message, Measurement | Posterior):
+            self._by_name[message.name, message.step].append(message)
+
+    def messages(self, kind: type[Kind]) -> list[Kind]:
+        """All messages of a kind, in the order of arrival."""
+        return [message for message in self._messages.values() if isinstance(message, kind)]
+
+    def of_step(self, name: str, step: int) -> list[Message]:
+        """What a sensor, a filter or a fusion said of a step."""
+        return self._by_name.get((name, step), [])
+
+    def newest(self, name: str, step: int, before_ns: int) -> Posterior | None:
+        """The newest set of a step that a peer had sent by then."""
+        found = [one for one in self.of_step(name, step) if isinstance(one, Posterior) and one.sent_ns <= before_ns]
+        return max(found, key=lambda one: (one.sent_ns, one.seq), default=None)
+
+    def has(self, reference: Reference) -> bool:
+        """Whether a message is in the recording."""
+        return reference in self._messages
 
     def sets(self) -> list[Posterior | Prediction]:
         """Everything that claims to hold the state, in the order of arrival, but each after what it was made from.
@@ -71,7 +89,7 @@ class Archive:
 
     def _made_from(self, message: Posterior | Prediction) -> list[Posterior | Prediction]:
         """The sets that a set was made from, as far as they are here."""
-        if isinstance(message, Prediction):
+        if isinstance(message, Prediction) and message.base is None:
             earlier = self._posteriors_before(message)
             return [max(earlier, key=lambda posterior: posterior.seq)] if earlier else []
         base = [message.base] if isinstance(message.base, tuple) else []
@@ -103,8 +121,3 @@ class Archive:
         """Revisions of the posterior of the step before that the process had published by then."""
         listed = self._posteriors.get((prediction.src, prediction.boot, prediction.step - 1), [])
         return [posterior for posterior in listed if posterior.sent_ns <= prediction.sent_ns]
-
-    def input_vector(self, step: int) -> Vector | None:
-        """The input that drives ``step`` on, (p,); None where none is recorded."""
-        message = self.inputs.get(step)
-        return None if message is None else np.array(message.u)

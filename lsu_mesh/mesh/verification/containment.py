@@ -12,10 +12,13 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
 
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Fused, Measurement, Message, Posterior, Prediction, Reference
+from lsu_mesh.mesh.messages import Fused, Guarantee, Measurement, Message, Posterior, Prediction, Reference
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.mesh.verification.archive import Archive, Unverifiable
+
+NOT_THERE = "what is not in the recording"
 
 
 class Miss(NamedTuple):
@@ -52,10 +55,10 @@ class Containment:
         """For the sets of a recording."""
         return cls(configuration, archive)
 
-    def check(self, message: Posterior | Prediction) -> None:
-        """Check one set, after all that it was made from."""
+    def check(self, message: Posterior | Prediction, proved: Guarantee | None) -> None:
+        """Check one set, after all that it was made from; ``proved``: its guarantee, recomputed from these."""
         truth = self.archive.truth.get(message.step)
-        reason = self._reason(message)
+        reason = self._reason(message, proved)
         if reason:
             self._reasons[message.reference] = reason
         if truth is None:
@@ -79,22 +82,22 @@ class Containment:
             return f"x = {x!r} is proved to lie outside of the support"
         return ""
 
-    def _reason(self, message: Posterior | Prediction) -> str:
-        """What a set rests on that was not true; "" where everything was."""
-        if message.guarantee != "declared":
-            return f"guarantee {message.guarantee!r}"
-        if isinstance(message, Prediction):
+    def _reason(self, message: Posterior | Prediction, proved: Guarantee | None) -> str:
+        """What a set rests on that was not true; "" where everything was. What it says of itself excuses nothing."""
+        if proved not in (None, "declared"):
+            return f"guarantee {proved!r}"
+        if isinstance(message, Prediction) and message.base is None:
             try:
                 return self._reasons.get(self.archive.posterior_before(message).reference, "")
             except Unverifiable:
-                return "what is not in the recording"
+                return NOT_THERE
         base = self._base_reason(message)
         used = [reason for reference in message.used if (reason := self._used_reason(reference))]
-        if isinstance(message, Fused) and message.policy == "relaxed":
+        if isinstance(message, Fused) and POLICIES[message.policy].takes_faults:
             used = used[message.faults :] if not _spans_steps(message, self.archive) else used
         return base or next(iter(used), "")
 
-    def _base_reason(self, message: Posterior) -> str:
+    def _base_reason(self, message: Posterior | Prediction) -> str:
         assert self.configuration is not None
         truth = self.archive.truth
         if message.base == "prior":
@@ -103,16 +106,20 @@ class Containment:
         if message.base in ("domain", "sources"):
             return ""
         reference = message.base
-        return self._reasons.get(reference, "") if isinstance(reference, tuple) else ""
+        if not isinstance(reference, tuple):
+            return ""
+        return self._reasons.get(reference, "") if self.archive.has(reference) else NOT_THERE
 
     def _used_reason(self, reference: Reference) -> str:
+        if reference[0] in ("posterior", "fused", "prediction"):
+            return self._reasons.get(reference, "") if self.archive.has(reference) else NOT_THERE
         if reference[0] != "measurement":
-            return self._reasons.get(reference, "")
+            return ""
         if reference not in self._measured:
             try:
                 message = self.archive.find(reference, Measurement)
             except Unverifiable:
-                self._measured[reference] = "what is not in the recording"
+                self._measured[reference] = NOT_THERE
             else:
                 self._measured[reference] = self._noise_reason(message)
         return self._measured[reference]

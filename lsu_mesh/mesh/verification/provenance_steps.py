@@ -28,7 +28,13 @@ def provenance_steps(posterior: Posterior, first: int, archive: Archive) -> dict
         raise DoesNotFit("base", f"a set of step {first}", f"one of step {posterior.step} or before")
     steps = {k: Brought() for k in range(first, posterior.step + 1)}
     found = [archive.find(reference, Message) for reference in posterior.used]
-    messages = [message for message in found if not isinstance(message, Suggestion)]  # no matter of a step's data
+    is_reach = posterior.base == "reach"  # the inputs before its step went into the base
+    messages = [
+        message
+        for message in found
+        if not isinstance(message, Suggestion)  # no matter of a step's data
+        and not (is_reach and isinstance(message, Input) and message.step < first)
+    ]
     for i, message in enumerate(messages):
         k = message.step
         if isinstance(message, Fused) and not isinstance(posterior, Fused):  # carried forward to a later step

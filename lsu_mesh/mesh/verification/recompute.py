@@ -5,31 +5,54 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.filters.lsucz import LSUCZ
-from lsu_mesh.fusion.fuse import fuse
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
-from lsu_mesh.mesh.estimation.inconsistency import update_without_contradicting_strips, widen
+from lsu_mesh.mesh.estimation.filter_step import contradiction_rule, filter_step, stack
+from lsu_mesh.mesh.estimation.fusion_step import OUTVOTED, Source, fusion_algorithm, fusion_engine, fusion_step
 from lsu_mesh.mesh.estimation.message_fields import described, described_box, finite_or_none, foretold
-from lsu_mesh.mesh.estimation.open_loop import OpenLoop
+from lsu_mesh.mesh.estimation.open_loop import MAX_LISTED, OpenLoop
 from lsu_mesh.mesh.estimation.transfer import Transfer
-from lsu_mesh.mesh.messages import Bounds, Measurement, Posterior, Prediction, Reference, Suggestion
+from lsu_mesh.mesh.messages import Base, Bounds, Fused, Input, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.provenance_steps import Brought, provenance_steps
 from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.supports.support import Support
 
 Fields = Mapping[str, Any]
 """Fields of a message and their values."""
+DataStatus = Literal["ok", "predicted", "inconsistent"]
+
+
+@dataclass(frozen=True)
+class Recomputed:
+    """A set again: the ``fields`` of its message that hold numbers, and what its claims rest on.
+
+    ``status`` is that of its step's data alone; ``is_widened``: whether r was widened since its base; ``outvoted``:
+    sources that contradict those that were used, ``None`` where that cannot be told.
+    """
+
+    fields: Fields
+    status: DataStatus = "ok"
+    is_widened: bool = False
+    outvoted: frozenset[str] | None = field(default_factory=frozenset)
+
+
 MAX_KEPT = 8192
 """So many states are remembered of a filter whose messages do not tell all that it holds."""
+
+
+class OtherAlgorithm(Unverifiable):
+    """A set was computed by another arithmetic than this one's."""
 
 
 class Recomputation(ABC):
@@ -41,42 +64,78 @@ class Recomputation(ABC):
         self._engine = engine
         self._kept: OrderedDict[Reference, object] = OrderedDict()
 
-    def posterior(self, recorded: Posterior) -> Fields:
-        """The fields that a posterior has by its provenance.
+    @property
+    @abstractmethod
+    def algorithm(self) -> tuple[str, int]:
+        """What computes the sets, and the number of its arithmetic."""
+
+    def posterior(self, recorded: Posterior) -> Recomputed:
+        """What a posterior has by its provenance.
 
         Raises :class:`Unverifiable` where something of it is not in the recording, :class:`DoesNotFit` where it
         contradicts itself.
         """
-        first = self._hold_base(recorded)
+        self._check_algorithm(recorded)
+        first = self._hold_base(recorded, recorded.base)
         steps = provenance_steps(recorded, first, self._archive)
-        fields: Fields = {}
+        found, is_widened = Recomputed({}), False
         try:
             for k, brought in steps.items():
-                fields = self._combine(k, brought, recorded)
+                found = self._combine(k, brought, recorded)
+                is_widened |= found.is_widened
                 if k < recorded.step:
                     self._advance(k, brought)
         except InconsistentData as error:
             raise DoesNotFit("used", "sets that have a point in common", str(error)) from None
         if not self._engine.is_resumable:
             self._keep(recorded.reference)
-        return {**fields, "support": to_message(self._engine.support)}
+        fields = {**found.fields, "support": to_message(self._engine.support)}
+        return replace(found, fields=fields, is_widened=is_widened)
 
-    def prediction(self, recorded: Prediction) -> Fields:
-        """The fields that a prediction has by the posterior and the input of the step before."""
-        base = self._archive.posterior_before(recorded)
-        self._hold(base)
-        self._engine.predict(self._input(base.step))
-        return {**foretold(self._engine), "support": to_message(self._engine.support)}
+    def prediction(self, recorded: Prediction) -> Recomputed:
+        """What a prediction has by its base and the input of the step before."""
+        self._check_algorithm(recorded)
+        if recorded.base is None:  # of an older peer, which does not say what it was made from
+            before = self._archive.posterior_before(recorded)
+            self._hold(before)
+            self._engine.predict(self._input(before.step))
+        elif self._hold_base(recorded, recorded.base) < recorded.step:
+            self._engine.predict(self._own_input(recorded))
+        bounds = {} if recorded.bounds is None else {"bounds": self._noise_bounds()}
+        return Recomputed({**foretold(self._engine), **bounds, "support": to_message(self._engine.support)})
+
+    def _check_algorithm(self, recorded: Posterior | Prediction) -> None:
+        """Sets of another arithmetic have other bits."""
+        what, number = self.algorithm
+        found = recorded.algorithm if recorded.algorithm is not None else 1
+        if found != number:
+            raise OtherAlgorithm(f"{what} algorithm {found}, this is {number}")
+
+    def _own_input(self, recorded: Prediction) -> Vector | Orthotope | None:
+        """What drove a prediction on: the input that it used, or the input box."""
+        if not self._engine.model.input_count:
+            return None
+        inputs = [self._archive.find(reference, Input) for reference in recorded.used]
+        if [message.step for message in inputs] == [recorded.step - 1] and not recorded.missing:
+            return np.array(inputs[0].u)
+        box = self._configuration.input_box
+        if inputs or recorded.missing != ["input"]:
+            words = f"the input of step {recorded.step - 1}"
+            raise DoesNotFit(
+                "used", f"{len(inputs)} inputs, missing {recorded.missing}", f"{words}, or that it is missing"
+            )
+        if box is None:
+            raise DoesNotFit("missing", recorded.missing, "nothing, because the configuration has no input_box")
+        return box
 
     @abstractmethod
-    def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Fields:
-        """Bring the step's data to the engine's set; the fields of a message about it."""
+    def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Recomputed:
+        """Bring the step's data to the engine's set; what a message about it has, but for the set itself."""
 
     # -- where a set begins
 
-    def _hold_base(self, recorded: Posterior) -> int:
-        """Hold the set that a posterior was made from; returns its step."""
-        base = recorded.base
+    def _hold_base(self, recorded: Posterior | Prediction, base: Base) -> int:
+        """Hold the set that a message was made from; returns its step."""
         if base == "prior":
             self._engine.reset(self._configuration.prior)
             return 1
@@ -87,7 +146,7 @@ class Recomputation(ABC):
             self._engine.reset(domain)
             return recorded.step
         if base == "reach":
-            self._engine.reset(self._reach(recorded.step))
+            self._engine.reset(self._reach(recorded))
             return recorded.step
         if base == "sources":
             return recorded.step
@@ -98,14 +157,18 @@ class Recomputation(ABC):
             self._engine.reset(to_support(message.support))
         return message.step
 
-    def _reach(self, k: int) -> Orthotope:
-        """The prior carried to step k."""
+    def _reach(self, recorded: Posterior | Prediction) -> Orthotope:
+        """The prior carried to a step; the set lists the inputs of it where a box may have stood in for one."""
+        k, known = recorded.step, self._archive.inputs
         if self._engine.model.input_count and self._configuration.input_box is not None:
-            raise Unverifiable(f"which inputs before step {k} were known in time is not told")
+            if recorded.algorithm is None or k - 1 > MAX_LISTED:  # of an older peer, or longer than a list may be
+                raise Unverifiable(f"which inputs before step {k} were known in time is not told")
+            found = [self._archive.find(reference, Input) for reference in recorded.used if reference[0] == Input.topic]
+            known = {message.step: message for message in found if message.step < k}
         reach = OpenLoop(self._engine.model)
         reach.begin(self._configuration.prior)
         for j in range(1, k):
-            reach.predict(self._input(j))
+            reach.predict(self._driven(j, known.get(j)))
         if reach.box is None:
             raise DoesNotFit("base", "the prior carried forward", "something that is bounded")
         return reach.box
@@ -128,21 +191,19 @@ class Recomputation(ABC):
     # -- time update
 
     def _advance(self, k: int, brought: Brought) -> None:
-        if not self._engine.model.input_count:
-            self._engine.predict()
-        elif brought.input is not None:
-            self._engine.predict(np.array(brought.input.u))
-        elif self._configuration.input_box is not None:
-            self._engine.predict(self._configuration.input_box)
-        else:
+        if self._engine.model.input_count and brought.input is None and self._configuration.input_box is None:
             raise DoesNotFit("used", f"no input of step {k}", "one, because the model has inputs and no input_box")
+        self._engine.predict(self._driven(k, brought.input))
 
-    def _input(self, k: int) -> Any:
+    def _input(self, k: int) -> Vector | Orthotope | None:
+        return self._driven(k, self._archive.inputs.get(k))
+
+    def _driven(self, k: int, message: Input | None) -> Vector | Orthotope | None:
+        """What drives step k on: the input, or the box of all inputs where it is not known."""
         if not self._engine.model.input_count:
             return None
-        u = self._archive.input_vector(k)
-        if u is not None:
-            return u
+        if message is not None:
+            return np.array(message.u)
         if self._configuration.input_box is None:
             raise Unverifiable(f"the input of step {k} is not in the recording")
         return self._configuration.input_box
@@ -164,14 +225,14 @@ class FilterRecomputation(Recomputation):
         self._adopted: dict[str, dict[int, Filter]] = {}
         """By process, the epoch at which bounds were adopted and the filter that goes by them."""
 
-    def posterior(self, recorded: Posterior) -> Fields:
+    def posterior(self, recorded: Posterior) -> Recomputed:
         for reference in recorded.used:
             if reference[0] == Suggestion.topic:
                 self._adopt(recorded, self._archive.find(reference, Suggestion))
         self._engine = self._in_force(recorded)
         return super().posterior(recorded)
 
-    def prediction(self, recorded: Prediction) -> Fields:
+    def prediction(self, recorded: Prediction) -> Recomputed:
         self._engine = self._in_force(recorded)
         return super().prediction(recorded)
 
@@ -193,104 +254,77 @@ class FilterRecomputation(Recomputation):
             raise Unverifiable("the message whose bounds were adopted is not in the recording")
         return self._declared
 
-    def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Fields:
-        gain = self._bring_transfers(k, brought)
-        status, factor = self._update(self._stack(brought.measurements))
-        if status != "inconsistent" and recorded.status in ("restarted", "inconsistent"):
-            status = recorded.status  # where a process began, and whose epoch ended, is no matter of this set's data
-        return {
+    @property
+    def algorithm(self) -> tuple[str, int]:
+        return self._settings.kind, self._engine.algorithm
+
+    def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Recomputed:
+        given = {message.name: message for message in brought.measurements}
+        foreign = sorted(given.keys() - set(self._settings.sensors))
+        if foreign:
+            raise DoesNotFit("used", f"sensors {', '.join(foreign)}", f"those of {self._settings.name}")
+        y = stack(self._configuration, self._settings.sensors, given)
+        rule = contradiction_rule(self._settings.on_inconsistency)
+        outcome = filter_step(self._engine, y, brought.transfers, lambda message: self._as_set(message, k), rule)
+        if outcome.rejected:
+            one = outcome.rejected[0]
+            raise DoesNotFit("used", f"the {one.message.topic} of {one.message.src}", f"it left out: {one.reason}")
+        fields = {
             **described(self._engine),
             "kind": self._settings.kind,
-            "gain": gain,
-            "status": status,
-            "bounds": self._noise_bounds(factor),
+            "gain": None if outcome.gain is None else finite_or_none(outcome.gain),
+            "bounds": self._noise_bounds(outcome.factor),
         }
+        return Recomputed(fields, outcome.status, outcome.factor > 1.0)
 
-    def _bring_transfers(self, k: int, brought: Brought) -> float | None:
-        gains = [self._engine.condition(self._as_set(message, k)) for message in brought.transfers]
-        return finite_or_none(sum(gains)) if gains else None
-
-    def _as_set(self, message: Any, k: int) -> Any:
+    def _as_set(self, message: Any, k: int) -> Support:
         try:
             return self._transfer.as_set(message, k, self._engine, self._archive.inputs)
         except KeyError as error:
             raise Unverifiable(f"the input of step {error} is not in the recording") from None
-
-    def _stack(self, measurements: Sequence[Measurement]) -> Vector:
-        """Measured outputs by sensor name, then row, NaN where missing."""
-        given = {message.name: message for message in measurements}
-        y: list[float] = []
-        for sensor in self._settings.sensors:
-            message, size = given.pop(sensor, None), len(self._configuration.sensors[sensor].C)
-            values = [None] * size if message is None else message.y
-            y += [np.nan if value is None else value for value in values]
-        if given:
-            raise DoesNotFit("used", f"sensors {', '.join(given)}", f"those of {self._settings.name}")
-        return np.array(y, dtype=np.float64)
-
-    def _update(self, y: Vector) -> tuple[str, float]:
-        """Data update by the rules of the filter; the status, and by how much r was widened."""
-        if np.isnan(y).all():
-            return "predicted", 1.0
-        try:
-            self._engine.update(y)
-        except InconsistentData:
-            if self._settings.on_inconsistency == "widen":
-                factor = widen(self._engine, y)
-                if factor is not None:
-                    return "ok", factor
-            update_without_contradicting_strips(self._engine, y)
-            return "inconsistent", 1.0
-        return "ok", 1.0
 
 
 class FusionRecomputation(Recomputation):
     """The fused sets of one fusion."""
 
     def __init__(self, configuration: Configuration, archive: Archive, name: str) -> None:
-        self._settings = settings = configuration.fusion[name]
-        engine = LSUCZ(
-            configuration.base_model,
-            configuration.prior,
-            max_generators=settings.max_generators,
-            max_constraints=settings.max_constraints,
-        )
-        super().__init__(configuration, archive, engine)
-        self._met: tuple[Vector, Vector] = engine.bounds()
+        self._settings = configuration.fusion[name]
+        self._policy = POLICIES[self._settings.policy]
+        super().__init__(configuration, archive, fusion_engine(configuration, self._settings))
 
-    def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Fields:
+    @property
+    def algorithm(self) -> tuple[str, int]:
+        return self._policy.name, fusion_algorithm(self._policy)
+
+    def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Recomputed:
+        sources = [Source.of(message) for message in brought.sources]
         alone = recorded.base == "sources" and k == recorded.step
-        if not alone:
-            self._met = self._engine.bounds()
-        if self._settings.policy == "relaxed":
-            self._relaxed(brought.sources, alone)
-        else:
-            self._intersected(brought.sources, alone)
-        self._engine.resume(self._engine.support, *self._met)
-        return {**described_box(*self._met), "kind": "fusion", "bounds": self._noise_bounds()}
+        outvoted: frozenset[str] | None = frozenset()
+        if k == recorded.step and self._policy.is_intersection and isinstance(recorded, Fused):
+            outvoted = self._outvoted(sources, recorded)
+        outcome = fusion_step(self._engine, sources, self._policy, self._settings.faults, has_prediction=not alone)
+        expected = "prediction" if not sources else "sources" if alone else "both"
+        if outcome.basis != expected:
+            raise DoesNotFit("used", f"sources of step {k} held by {expected}", f"by {outcome.basis}")
+        if not self._policy.is_intersection:
+            outvoted = frozenset(source.name for source in outcome.rejected)
+        fields = {**described_box(*self._engine.bounds()), "kind": "fusion", "bounds": self._noise_bounds()}
+        return Recomputed(fields, "ok" if sources else "predicted", outvoted=outvoted)
 
-    def _intersected(self, sources: Sequence[Posterior], alone: bool) -> None:
-        if alone:
-            first, *sources = sources
-            self._engine.reset(to_support(first.support))
-            self._met = np.array(first.lower), np.array(first.upper)
-        for source in sources:
-            bounds = np.array(source.lower), np.array(source.upper)
-            self._engine.condition(to_support(source.support))
-            self._meet(bounds)
-            self._meet(self._engine.bounds())
+    def _outvoted(self, used: Sequence[Source], recorded: Fused) -> frozenset[str] | None:
+        """Which of the sources that are said to contradict the used ones do; ``None`` where their sets are not known.
 
-    def _relaxed(self, sources: Sequence[Posterior], alone: bool) -> None:
-        if not sources:
-            return
-        together = fuse([to_support(source.support) for source in sources], "relaxed", self._settings.faults)
-        if alone:
-            self._engine.reset(together.support)
-            self._met = together.bounds
-            return
-        self._engine.condition(together.support)
-        self._meet(together.bounds)
-        self._meet(self._engine.bounds())
-
-    def _meet(self, bounds: tuple[Vector, Vector]) -> None:
-        self._met = np.maximum(self._met[0], bounds[0]), np.minimum(self._met[1], bounds[1])
+        The newest set of each at that time is taken; which revision it was is not told.
+        """
+        said = {one.source for one in recorded.rejected if one.reason == OUTVOTED}
+        candidates = [self._archive.newest(name, recorded.step, recorded.sent_ns) for name in sorted(said)]
+        if not said:
+            return frozenset()
+        if any(candidate is None for candidate in candidates):
+            return None
+        others = [Source.of(message) for message in candidates if message is not None]
+        before = self._engine.snapshot()
+        together = sorted([*used, *others], key=lambda source: source.name)
+        outcome = fusion_step(self._engine, together, self._policy, self._settings.faults, has_prediction=True)
+        self._engine.restore(before)
+        return frozenset(source.name for source in outcome.rejected)

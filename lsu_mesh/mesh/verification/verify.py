@@ -5,45 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Fused, Message, Posterior, Prediction
+from lsu_mesh.mesh.messages import Fused, Message, Prediction
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
+from lsu_mesh.mesh.verification.claims import Claims
 from lsu_mesh.mesh.verification.containment import Containment
-from lsu_mesh.mesh.verification.recompute import FilterRecomputation, FusionRecomputation, Recomputation
-
-
-class Difference(NamedTuple):
-    """A recorded set that is not what its provenance gives; ``field`` names the first number that differs."""
-
-    peer: str
-    topic: str
-    step: int
-    seq: int
-    field: str
-    recorded: Any
-    recomputed: Any
-
-    def __str__(self) -> str:
-        place = f"{self.peer}, step {self.step}, {self.field} of {self.topic} {self.seq}"
-        return f"{place}: {self.recorded!r} in the recording, {self.recomputed!r} recomputed"
-
-
-class Missing(NamedTuple):
-    """A recorded set that cannot be recomputed, and why."""
-
-    peer: str
-    topic: str
-    step: int
-    seq: int
-    reason: str
-
-    def __str__(self) -> str:
-        return f"{self.peer}, step {self.step}, {self.topic} {self.seq}: {self.reason}"
+from lsu_mesh.mesh.verification.findings import Difference, Missing
+from lsu_mesh.mesh.verification.lineage import Set
+from lsu_mesh.mesh.verification.recompute import (
+    FilterRecomputation,
+    FusionRecomputation,
+    OtherAlgorithm,
+    Recomputation,
+    Recomputed,
+)
 
 
 @dataclass
@@ -53,12 +33,18 @@ class Verification:
     exact: Counter[tuple[str, str]] = field(default_factory=Counter)
     differences: list[Difference] = field(default_factory=list)
     unverifiable: list[Missing] = field(default_factory=list)
+    outdated: Counter[str] = field(default_factory=Counter)
+    """Of the unverifiable ones those that another arithmetic computed, by its number."""
+    false_claims: list[Difference] = field(default_factory=list)
+    """What sets say of themselves that their provenance, the events or the configuration contradict."""
+    unproved: Counter[str] = field(default_factory=Counter)
+    """Claims that cannot be recomputed, by name."""
     containment: Containment = field(default_factory=Containment)
 
     @property
     def holds(self) -> bool:
-        """Whether all sets that can be recomputed are equal, and no set that must hold the truth misses it."""
-        return not self.differences and not self.containment.misses
+        """Whether what can be recomputed is equal, no claim is false, and no set that must hold the truth misses it."""
+        return not self.differences and not self.false_claims and not self.containment.misses
 
 
 def verify(configuration: Configuration, messages: Iterable[Message]) -> Verification:
@@ -69,12 +55,16 @@ def verify(configuration: Configuration, messages: Iterable[Message]) -> Verific
     archive = Archive(messages)
     recomputations: dict[str, Recomputation] = {}
     found = Verification(containment=Containment.of(configuration, archive))
+    claims = Claims(configuration, archive)
     for recorded in archive.sets():
-        found.containment.check(recorded)
         recomputation = recomputations.get(recorded.src)
         if recomputation is None:
             recomputation = recomputations[recorded.src] = _recomputation(configuration, archive, recorded)
-        _check(found, recomputation, recorded)
+        recomputed = _check(found, recomputation, recorded)
+        claims.check_lineage(recorded, recomputed)
+        found.containment.check(recorded, claims.proved_guarantee(recorded))
+    claims.check_processes()
+    found.false_claims, found.unproved = claims.false, claims.unproved
     return found
 
 
@@ -84,27 +74,31 @@ def _recomputation(configuration: Configuration, archive: Archive, recorded: Mes
     return FilterRecomputation(configuration, archive, recorded.name)
 
 
-def _check(found: Verification, recomputation: Recomputation, recorded: Posterior | Prediction) -> None:
+def _check(found: Verification, recomputation: Recomputation, recorded: Set) -> Recomputed | None:
+    """Compare one set; what it is by its provenance, or ``None`` where it cannot be recomputed."""
     place = (recorded.src, recorded.topic, recorded.step, recorded.seq)
     try:
         if isinstance(recorded, Prediction):
-            fields = recomputation.prediction(recorded)
+            recomputed = recomputation.prediction(recorded)
         else:
-            fields = recomputation.posterior(recorded)
+            recomputed = recomputation.posterior(recorded)
     except Unverifiable as reason:
         found.unverifiable.append(Missing(*place, str(reason)))
-        return
+        if isinstance(reason, OtherAlgorithm):
+            found.outdated[str(reason)] += 1
+        return None
     except DoesNotFit as wrong:
         found.differences.append(Difference(*place, wrong.field, wrong.recorded, wrong.expected))
-        return
+        return None
     except LsuMeshError as error:
         found.differences.append(Difference(*place, "base", "a set of the model", str(error)))
-        return
-    different = next(differences(recorded, fields), None)
+        return None
+    different = next(differences(recorded, recomputed.fields), None)
     if different is None:
         found.exact[recorded.src, recorded.topic] += 1
     else:
         found.differences.append(Difference(*place, *different))
+    return recomputed
 
 
 def differences(recorded: Message, fields: Any) -> Iterator[tuple[str, Any, Any]]:

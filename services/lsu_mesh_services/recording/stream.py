@@ -18,7 +18,10 @@ from typing import Any
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from lsu_mesh.filters.registry import filter_class
+from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.estimation.fusion_step import fusion_algorithm
 from lsu_mesh_services.recording.blueprint import blueprint
 from lsu_mesh_services.recording.entity_paths import EntityPaths
 from lsu_mesh_services.recording.repair import repair
@@ -116,6 +119,7 @@ def run_description(configuration: Configuration) -> dict[str, str]:
         "settings": json.dumps(configuration.values),
         "mesh": configuration.mesh.name,
         "model": json.dumps(matrices),
+        "algorithms": json.dumps(algorithms(configuration)),
         "model_digest": configuration.digest(),
         "seed": str(configuration.mesh.seed),
         "dt": repr(configuration.mesh.dt),
@@ -124,6 +128,14 @@ def run_description(configuration: Configuration) -> dict[str, str]:
         "platform": f"{sys.platform} {platform.machine()}",
         "numba_cpu_name": os.environ.get("NUMBA_CPU_NAME", ""),
     } | {package.replace("-", "_"): _version(package) for package in PACKAGES}
+
+
+def algorithms(configuration: Configuration) -> dict[str, int]:
+    """Numbers of the arithmetic of the filters and policies of a mesh; sets of another number have other bits."""
+    kinds = {one.kind for one in configuration.filters.values()}
+    policies = {one.policy for one in configuration.fusion.values()}
+    numbers = {kind: filter_class(kind).algorithm for kind in sorted(kinds)}
+    return numbers | {policy: fusion_algorithm(POLICIES[policy]) for policy in sorted(policies)}
 
 
 def _claim(path: Path) -> None:

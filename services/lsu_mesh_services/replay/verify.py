@@ -6,6 +6,7 @@ import json
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from lsu_mesh.mesh.verification import Verification, verify
@@ -26,7 +27,8 @@ class Report:
     @property
     def is_met(self) -> bool:
         """Whether there is something to prove and all of it is proved."""
-        return self.found.holds and not self.recording.damaged and self.found.exact.total() > 0
+        has_sets = self.found.exact.total() + self.found.outdated.total() > 0
+        return self.found.holds and not self.recording.damaged and has_sets
 
     def counts(self) -> dict[str, dict[str, int]]:
         """By peer: sets that are exact, different, unverifiable."""
@@ -65,7 +67,7 @@ def _print_table(report: Report) -> None:
     for peer, counts in report.counts().items():
         table.add_row(peer, *(str(count) for count in counts.values()))
     console.print(table)
-    for line in (*_verdict(report), *_about_truth(report)):
+    for line in (*_verdict(report), *_about_claims(report), *_about_truth(report)):
         console.print(line, markup=False, soft_wrap=True)
 
 
@@ -81,12 +83,29 @@ def _verdict(report: Report) -> list[str]:
         lines.append(f"{total} sets recomputed from their provenance in {report.seconds:.1f} s: equal, bit by bit")
     else:
         lines.append("the recording holds no set that could be recomputed")
-    if found.unverifiable:
-        lines.append(f"{len(found.unverifiable)} sets are unverifiable, because the recorder missed what they used:")
-        lines += [f"  {missing}" for missing in found.unverifiable[:MAX_SHOWN]]
-        if len(found.unverifiable) > MAX_SHOWN:
-            lines.append(f"  and {len(found.unverifiable) - MAX_SHOWN} more; --json lists all")
+    lines += [f"{count} sets are unverifiable: {words}" for words, count in found.outdated.items()]
+    missed = [missing for missing in found.unverifiable if missing.reason not in found.outdated]
+    if missed:
+        lines.append(f"{len(missed)} sets are unverifiable, because the recorder missed what they used:")
+        lines += _first(missed)
     return lines
+
+
+def _about_claims(report: Report) -> list[str]:
+    """What the sets say of themselves."""
+    found, lines = report.found, []
+    if found.false_claims:
+        lines.append(f"{len(found.false_claims)} claims of sets are false; the first:")
+        lines += _first(found.false_claims)
+    for words, count in found.unproved.most_common():
+        lines.append(f"{count} claims cannot be proved: {words}")
+    return lines
+
+
+def _first(found: Sequence[object]) -> list[str]:
+    """Lines of the first few, and how many more there are."""
+    lines = [f"  {one}" for one in found[:MAX_SHOWN]]
+    return lines if len(found) <= MAX_SHOWN else [*lines, f"  and {len(found) - MAX_SHOWN} more; --json lists all"]
 
 
 def _about_truth(report: Report) -> list[str]:
@@ -121,6 +140,8 @@ def _print_json(report: Report) -> None:
         print(json.dumps({"type": "difference", **difference._asdict()}))
     for missing in found.unverifiable:
         print(json.dumps({"type": "unverifiable", **missing._asdict()}))
+    for claim in found.false_claims:
+        print(json.dumps({"type": "false_claim", **claim._asdict()}))
     for miss in containment.misses:
         print(json.dumps({"type": "miss", **miss._asdict()}))
     for words in report.recording.damaged:
@@ -131,6 +152,9 @@ def _print_json(report: Report) -> None:
         "exact": found.exact.total(),
         "different": len(found.differences),
         "unverifiable": len(found.unverifiable),
+        "outdated": dict(found.outdated),
+        "false_claims": len(found.false_claims),
+        "unproved_claims": dict(found.unproved),
         "hold_truth": containment.holding,
         "miss_truth": len(containment.misses),
         "excused": dict(containment.excused),

@@ -121,13 +121,13 @@ def test_a_mistake_elsewhere_does_not_hide_one_of_the_constructor(demo: Path) ->
 
 
 def test_the_old_name_of_a_key_is_read(demo: Path) -> None:
-    assert load(demo, ["filters.box.on_contradiction=widen"]).filters["box"].on_inconsistency == "widen"
-    (one,) = records(demo, "filters.box.on_contradiction=wide").values()
+    assert load(demo, ["filters.box.on_inconsistency=widen"]).filters["box"].on_inconsistency == "widen"
+    (one,) = records(demo, "filters.box.on_inconsistency=wide").values()
     assert (one.key, one.nearest) == ("on_contradiction", "widen")
 
 
 def with_old_key(demo: Path) -> Configuration:
-    return load(demo, ["filters.box.on_contradiction=hold"])
+    return load(demo, ["filters.box.on_inconsistency=hold"])
 
 
 def test_a_recording_that_holds_the_old_name_is_read_and_a_flag_beats_it(demo: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from lsu_mesh.mesh.estimation import timeline
 from lsu_mesh.mesh.messages import Event, Fused, Health, Input, Measurement, Message, Posterior, decode, encode
 from lsu_mesh.mesh.nodes import estimator, fusion
 
@@ -85,50 +86,50 @@ def heard(module_mesh: Callable[..., Any]) -> Any:
 
 @pytest.mark.parametrize(("role", "name"), [("filter", "box"), ("fusion", "main")])
 def test_one_that_gets_more_than_a_tick_does_stays_bounded_says_so_and_catches_up(
-    heard: Any, monkeypatch: pytest.MonkeyPatch, role: str, name: str
+    received: Any, monkeypatch: pytest.MonkeyPatch, role: str, name: str
 ) -> None:
     monkeypatch.setattr(estimator, "MAX_AT_ONCE", AT_ONCE)
     monkeypatch.setattr(fusion, "FAR_BEHIND", 10**6)
-    node = heard.start(role, name)
+    node = received.start(role, name)
     kinds = Input | Measurement if role == "filter" else Input | Posterior
-    data = [(address, m) for address, m in heard.sent if isinstance(m, kinds) and m.name != name]
+    data = [(address, m) for address, m in received.sent if isinstance(m, kinds) and m.name != name]
     backlogs, told = [], []
     for first in range(1, 2001, 250):
         for address, message in data:
             if first <= message.step < first + 250:
-                node.deliver(address, encode(message), heard.now)
-        told += node.tick(heard.now + first * 2_000_000)
+                node.deliver(address, encode(message), received.now)
+        told += node.tick(received.now + first * 2_000_000)
         backlogs.append(node.counters()["newest"] - node.step())
     assert max(backlogs) <= AT_ONCE
-    assert backlogs[-1] > estimator.BEHIND, "it did not keep up"
+    assert backlogs[-1] > timeline.BEHIND, "it did not keep up"
     reasons = [reason for m in told if isinstance(m, Health) and m.level == "WARN" for reason in m.reasons]
     assert any(reason.startswith("behind by ") for reason in reasons), reasons
-    published = [m for m in [*told, *ticked(node, 2000, heard.now + 10**11)] if isinstance(m, Posterior)]
+    published = [m for m in [*told, *ticked(node, 2000, received.now + 10**11)] if isinstance(m, Posterior)]
     assert published[-1].step == 2000
     assert isinstance(published[-1], Fused) == (role == "fusion")
     assert node.counters()["behind"] + len(published) == 2000
     assert node.counters()["behind"] > 1500
-    assert node.health(heard.now + 2 * 10**11).level == "OK"
-    truth = heard.truth()
+    assert node.health(received.now + 2 * 10**11).level == "OK"
+    truth = received.truth()
     for message in published:
         assert all(
             low <= x <= high for low, x, high in zip(message.lower, truth[message.step], message.upper, strict=True)
         )
 
 
-def test_a_fusion_that_is_too_far_behind_goes_on_where_its_sources_are_and_says_so(heard: Any) -> None:
-    node = heard.start("fusion", "main")
-    data = [(address, m) for address, m in heard.sent if isinstance(m, Input | Posterior) and m.name != "main"]
+def test_a_fusion_that_is_too_far_behind_goes_on_where_its_sources_are_and_says_so(received: Any) -> None:
+    node = received.start("fusion", "main")
+    data = [(address, m) for address, m in received.sent if isinstance(m, Input | Posterior) and m.name != "main"]
 
     def hear(first: int, last: int) -> None:
         for address, message in data:
             if first <= message.step <= last:
-                node.deliver(address, encode(message), heard.now)
+                node.deliver(address, encode(message), received.now)
 
     hear(1, 20)
-    node.tick(heard.now)
+    node.tick(received.now)
     hear(21, 1500)
-    told = [*node.tick(heard.now + 1), *ticked(node, 1500, heard.now + 2)]
+    told = [*node.tick(received.now + 1), *ticked(node, 1500, received.now + 2)]
     assert node.counters()["skipped"] == 1500 - node.history - 21
     (event,) = [m for m in told if isinstance(m, Event)]
     assert (event.level, event.code) == ("WARN", "skipped-ahead")
@@ -137,20 +138,20 @@ def test_a_fusion_that_is_too_far_behind_goes_on_where_its_sources_are_and_says_
     assert (fused[0].base, fused[0].status, fused[0].step) == ("sources", "restarted", 1500)
     assert {src for _, src, _, _ in fused[0].used} == {"filter/box", "filter/para"}
     hear(1501, 1510)
-    told = node.tick(heard.now + 10**9)
+    told = node.tick(received.now + 10**9)
     fused += [m for m in told if isinstance(m, Fused)]
     assert [m.step for m in fused] == list(range(1500, 1511))
-    truth = heard.truth()
+    truth = received.truth()
     for m in fused:
         assert all(low <= x <= high for low, x, high in zip(m.lower, truth[m.step], m.upper, strict=True))
 
 
-def test_a_fusion_that_is_far_behind_without_its_sources_keeps_what_it_has(heard: Any) -> None:
-    node = heard.start("fusion", "main")
-    for address, message in heard.sent:
+def test_a_fusion_that_is_far_behind_without_its_sources_keeps_what_it_has(received: Any) -> None:
+    node = received.start("fusion", "main")
+    for address, message in received.sent:
         if isinstance(message, Input) or (isinstance(message, Posterior) and message.step <= 20):
-            node.deliver(address, encode(message), heard.now)
-    ticked(node, 2000, heard.now + 10**9)
+            node.deliver(address, encode(message), received.now)
+    ticked(node, 2000, received.now + 10**9)
     assert node.counters()["skipped"] == 0
     assert node.last_posterior is not None
     assert node.last_posterior.step >= 1999

@@ -237,16 +237,16 @@ class Collections:
 
     def __init__(self) -> None:
         self.took_ns = self._began = 0
-        gc.callbacks.append(self._note)
+        gc.callbacks.append(self._record)
 
-    def _note(self, phase: str, about: dict[str, int]) -> None:
+    def _record(self, phase: str, about: dict[str, int]) -> None:
         if phase == "start":
             self._began = time.thread_time_ns()
         else:
             self.took_ns += time.thread_time_ns() - self._began
 
     def end(self) -> None:
-        gc.callbacks.remove(self._note)
+        gc.callbacks.remove(self._record)
 
 
 def assault(configuration: Configuration, node: Node, seed: int, count: int) -> list[int]:

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from lsu_mesh.mesh.admission import Admission
-from lsu_mesh.mesh.estimation.step_record import Base
-from lsu_mesh.mesh.messages import Posterior
+from lsu_mesh.mesh.messages import Base, Posterior
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.simulator import run
 from lsu_mesh.mesh.simulator.faults import FAULTS, parse_faults
@@ -40,8 +39,8 @@ def seeds_until_found(demo: Path, faults: tuple[str, ...] = FAULTS) -> tuple[int
 def test_a_stale_set_taken_as_current_is_found(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begin = Estimator._begin
 
-    def begin_now(self: Estimator, k: int, support: Support, base: Base, *, restarted: bool) -> None:
-        begin(self, max(k, self._step_arrivals.newest), support, base, restarted=restarted)
+    def begin_now(self: Estimator, k: int, support: Support, base: Base) -> None:
+        begin(self, max(k, self.timeline.arrivals.newest), support, base)
 
     monkeypatch.setattr(Estimator, "_begin", begin_now)
     _, outcome = seeds_until_found(demo)

@@ -16,6 +16,7 @@ from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
 from lsu_mesh_services.recording.read import parts, read_recording
 from recorded_mesh import record
 
+from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Measurement, Message, Posterior, encode
 
@@ -239,3 +240,31 @@ def test_mistakes_are_said(run: Run, recording: Path, tmp_path: Path) -> None:
     code, _, err = run(recording, "--verify", "-X", "mesh.steps=3")
     assert code == USAGE
     assert "leave out -X" in err
+
+
+def test_a_recording_of_another_arithmetic(
+    recording: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert json.loads(read_recording(recording).description["algorithms"]) == {
+        "LSUCZ": 1, "LSUO": 1, "LSUP": 1, "intersect": 1,
+    }  # fmt: skip
+    monkeypatch.setattr(LSUCZ, "algorithm", 2)
+    assert main(["replay", str(recording), "--verify"]) == OK
+    out = capsys.readouterr().out
+    assert "120 sets are unverifiable: LSUCZ algorithm 1, this is 2" in out
+    assert "60 sets are unverifiable: intersect algorithm 1, this is 2" in out
+    assert "240 sets recomputed from their provenance" in out
+
+
+def test_a_false_claim_is_told(run: Run, mesh: LocalMesh, tmp_path: Path) -> None:
+    def weaken(message: Message, payload: bytes) -> bytes:
+        is_it = isinstance(message, Posterior) and (message.name, message.step) == ("box", 10)
+        return payload.replace(b"\xa8declared", b"\xa7learned", 1) if is_it else payload
+
+    code, lines, _ = run(record(mesh, tmp_path / "weaker.rrd", weaken), "--verify")
+    assert code == NOT_MET
+    claims = {(line["peer"], line["step"], line["field"], line["recomputed"]) for line in of("false_claim", lines)}
+    assert ("filter/box", 10, "guarantee", "declared") in claims
+    (summary,) = of("verification", lines)
+    assert summary["false_claims"] == len(claims)
+    assert summary["different"] == 0
