@@ -13,10 +13,10 @@ REST = "*"
 """All files of the package that no layer names."""
 LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh": [
-        ("errors", "array_types"),
+        ("errors", "array_types", "lazy_exports"),
         ("kernels",),
         ("supports",),
-        ("model",),
+        ("model", "model_arguments"),
         ("systems", "simulation", "metrics"),
         ("filters", "fusion"),
         ("identification", "testing"),
@@ -24,8 +24,8 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh.kernels": [
         ("runtime",),
-        ("linear_programs", "parallelotopes", "zonotopes"),
-        ("filter_step", "plant_step"),
+        ("linear_programs", "parallelotopes", "zonotopes", "discretisation"),
+        ("filter_step", "plant_step", "plain_outputs"),
         ("batch_run",),
     ],
     "lsu_mesh.kernels.runtime": [("compile", "unowned_views"), (REST,)],
@@ -54,7 +54,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh.filters": [
         ("filter", "validation", "inconsistency", "transfer_gain"),
-        ("compiled", "constrained_intersection", "window"),
+        ("compiled", "constrained_intersection", "plain_outputs", "window"),
         (REST,),
         ("registry", "run"),
         ("bank", "warm_up"),
@@ -67,10 +67,10 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh.fusion": [("intersection",), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
-        ("keys", "messages", "ledger"),
-        ("message_examples", "sets"),
+        ("keys", "messages", "unknown_fields", "ledger", "grid"),
+        ("message_examples", "sets", "data_files"),
         ("config",),
-        ("access", "admission"),
+        ("access", "admission", "model_answer"),
         ("flows",),
         ("estimation",),
         ("nodes",),
@@ -78,7 +78,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [
-        ("table", "settings", "write", "measurement_files"),
+        ("table", "settings", "write", "measurement_files", "expected", "problem"),
         (REST,),
         ("load",),
     ],
@@ -102,10 +102,10 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         (REST,),
     ],
     "lsu_mesh_services": [
-        ("exit_codes", "stop", "options", "supervisor"),
+        ("exit_codes", "extras", "stop", "options", "supervisor"),
         ("network",),
         ("bus",),
-        ("configuration",),
+        ("configuration", "session", "new_mesh", "played_files"),
         ("recording", "monitoring"),
         ("viewers", "peer", "recorder"),
         ("mesh_launcher",),
