@@ -66,7 +66,7 @@ def run(line: str, tree: Path) -> None:
     programs = {"python": [sys.executable, "-P"], "lsu-mesh": [sys.executable, "-P", "-m", "lsu_mesh_services"]}
     command = [*programs[words[0]], *words[1:]]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join((str(tree), str(tree / "services")))}
-    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=500, check=False)
     assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
 
 
@@ -84,6 +84,7 @@ def tree(root: Path, tmp_path: Path) -> Path:
 TITLES = ("Add a filter", "Add a message field", "Add a command", "Add a fusion policy")
 
 
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("title", TITLES)
 def test_a_walk_leads_where_it_says(root: Path, tree: Path, title: str) -> None:
     needed = NEEDS.get(title)
