@@ -79,7 +79,7 @@ def test_validate_prints_the_account_and_warns_of_what_is_left_out(
     (mesh.parent / "gauge.csv").write_text("t,y\n99,1\n100.5,2\n100.6,3\n101,\n")
     assert main(["validate", str(mesh)]) == 0
     told = capsys.readouterr().err
-    assert "gauge.csv: 4 rows, 99 s to 101 s (2 s); period 500 ms (from 100 ms to 1.5 s)" in told
+    assert "gauge.csv: 4 rows, 99 s to 101 s (2 s); period 400 ms (from 100 ms to 1.5 s)" in told
     assert "  played: 2 rows on 2 steps, 1 to 2, 0 of them without a row; 1 value missing" in told
     assert (
         "gauge.csv: warning: 2 of 4 rows are left out: 1 before start_time, 1 share a step with an earlier row "
