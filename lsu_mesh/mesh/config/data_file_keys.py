@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from lsu_mesh.mesh.config.table import Table
 
 KEYS = ("delimiter", "decimal", "comment", "missing", "time_unit")
+DELIMITERS = (",", ";", "\t", "|", ":", " ")
 
 
 class FileFormat(TypedDict):
@@ -24,16 +25,15 @@ class FileFormat(TypedDict):
 
 def read_file_format(table: Table) -> FileFormat:
     """The keys as they are given; what is not given is found in the file."""
-    delimiter = table.text("delimiter", None)
-    if delimiter is not None and (len(delimiter) != 1 or delimiter in '"\r\n' or not delimiter.isascii()):
-        table.wrong("delimiter", f'expected one character such as ";" or "\\t", found {delimiter!r}')
-        delimiter = None
-    decimal = table.choice("decimal", (".", ","), ".")
-    comment = table.read("comment", "#", "a string", lambda v: v if isinstance(v, str) and "\n" not in v else None)
-    missing = table.texts("missing", list(MISSING_WORDS))
-    time_unit = table.choice("time_unit", tuple(TIME_UNITS), "s") if "time_unit" in table.values else None
-    if "time_unit" not in table.values:
-        table.read("time_unit", None, "a unit", lambda v: v)  # so that the key is known
     return FileFormat(
-        delimiter=delimiter, decimal=decimal, comment=comment, missing=tuple(missing), time_unit=time_unit
-    )  # fmt: skip
+        delimiter=_one_of(table, "delimiter", DELIMITERS),
+        decimal=table.choice("decimal", (".", ","), "."),
+        comment=table.text("comment", "#"),
+        missing=tuple(table.texts("missing", list(MISSING_WORDS))),
+        time_unit=_one_of(table, "time_unit", tuple(TIME_UNITS)),
+    )
+
+
+def _one_of(table: Table, key: str, words: tuple[str, ...]) -> str | None:
+    """One of the words, or None where the key is not given."""
+    return table.choice(key, words, words[0]) if key in table.values else table.text(key, None)

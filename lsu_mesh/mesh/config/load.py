@@ -9,9 +9,12 @@ import copy
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import date
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from lsu_mesh.errors import ModelError
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
 from lsu_mesh.mesh.config.peers import (
     check_learning,
@@ -31,6 +34,7 @@ from lsu_mesh.mesh.config.settings import (
 )
 from lsu_mesh.mesh.config.system import read_model
 from lsu_mesh.mesh.config.table import ConfigurationError, Problems, Table
+from lsu_mesh.mesh.data_files.moments import start_time_ns
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
 
 ENVIRONMENT_PREFIX = "LSU_MESH_"
@@ -85,6 +89,7 @@ def load_values(
 
 
 def _checked(values: dict[str, Any], path: Path, problems: Problems) -> Configuration:
+    _spell_out_dates(values)
     original = copy.deepcopy(values)
     configuration = _read(values, path, problems)
     problems.raise_if_any()
@@ -180,9 +185,23 @@ def _read_mesh(root: Table) -> MeshSettings:
     steps = table.whole("steps", None, low=1)
     seed = table.whole("seed", 1)
     rate = table.number("rate", 1.0 / dt if isinstance(dt, float) else 1.0, above=0.0)
-    start_time = table.number("start_time", None)
+    start_time = table.read("start_time", None, "seconds, or a moment such as 2024-05-01T12:00:00Z", _start_seconds)
     table.finish()
     return MeshSettings(name, dt, steps, seed, rate, start_time)
+
+
+def _spell_out_dates(values: dict[str, Any]) -> None:
+    """``start_time`` as ISO text: the values are recorded, and a recording holds no dates of TOML."""
+    mesh = values.get("mesh")
+    if isinstance(mesh, dict) and isinstance(mesh.get("start_time"), date):
+        mesh["start_time"] = mesh["start_time"].isoformat()
+
+
+def _start_seconds(value: object) -> float | None:
+    try:
+        return float(Fraction(start_time_ns(value)[0], 10**9))
+    except ModelError:
+        return None
 
 
 def _named(root: Table, key: str, problems: Problems) -> dict[str, Table]:
