@@ -66,6 +66,9 @@ class Grid:
         p, q = step_ns.numerator, step_ns.denominator
         if not self._fits(k, p, q):
             return np.array([self.time_of(one) for one in k.tolist()], dtype=np.int64)
+        if q == 1:
+            on_whole_ns: Int = self.start_ns + k * p
+            return on_whole_ns
         whole, rest = np.divmod(k, q)
         part, over = np.divmod(rest * p, q)
         up = (2 * over > q) | ((2 * over == q) & ((whole * p + part) % 2 == 1))

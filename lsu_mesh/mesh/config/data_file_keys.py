@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 _FOUND: str | None = None
 """It is found in the file."""
 KEYS = ("delimiter", "decimal", "comment", "missing", "time_unit")
+_DELIMITERS = choice((",", ";", "\t", "|", ":", " "))
 
 
 class FileFormat(TypedDict):
@@ -28,7 +29,7 @@ class FileFormat(TypedDict):
 def read_file_format(table: Table) -> FileFormat:
     """The keys as they are given; what is not given is found in the file."""
     delimiter: str | None = table.read(
-        "delimiter", _FOUND, Expected[str | None]('one character such as ";" or "\\t"', _as_delimiter)
+        "delimiter", _FOUND, Expected[str | None](_DELIMITERS.words, _DELIMITERS.convert)
     )
     decimal = table.choice("decimal", (".", ","), ".")
     comment = table.read("comment", "#", Expected("the text that begins a comment", _as_comment))
@@ -38,12 +39,6 @@ def read_file_format(table: Table) -> FileFormat:
     return FileFormat(
         delimiter=delimiter, decimal=decimal, comment=comment, missing=tuple(missing), time_unit=time_unit
     )  # fmt: skip
-
-
-def _as_delimiter(value: object) -> str:
-    if not isinstance(value, str) or len(value) != 1 or value in '"\r\n' or not value.isascii():
-        raise Unfit
-    return value
 
 
 def _as_comment(value: object) -> str:

@@ -11,10 +11,13 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import date
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from lsu_mesh.mesh.config.expected import shown
+from lsu_mesh.errors import ModelError
+from lsu_mesh.mesh.config.expected import Expected, Unfit, shown
 from lsu_mesh.mesh.config.filters import kind_of, read_filter
 from lsu_mesh.mesh.config.fusion import check_learning, read_fusion, read_identifier, shared_sensor_warnings
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
@@ -30,6 +33,7 @@ from lsu_mesh.mesh.config.settings import (
 from lsu_mesh.mesh.config.system import read_model
 from lsu_mesh.mesh.config.table import Table
 from lsu_mesh.mesh.config.toml_lines import key_lines
+from lsu_mesh.mesh.data_files.moments import start_time_ns
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
 
 
@@ -82,6 +86,7 @@ def load_values(
 
 
 def _checked(values: dict[str, Any], path: Path, problems: Problems) -> Configuration:
+    _spell_out_dates(values)
     original = copy.deepcopy(values)
     configuration = _read(values, path, problems)
     problems.raise_if_any()
@@ -174,9 +179,27 @@ def _read_mesh(root: Table) -> MeshSettings:
     steps = table.whole("steps", None, low=1)
     seed = table.whole("seed", 1)
     rate = table.number("rate", 1.0 / dt if isinstance(dt, float) else 1.0, above=0.0)
-    start_time = table.number("start_time", None)
+    start_time: float | None = table.read("start_time", NO_START, START_TIME)
     table.finish()
     return MeshSettings(name, dt, steps, seed, rate, start_time)
+
+
+def _spell_out_dates(values: dict[str, Any]) -> None:
+    """``start_time`` as ISO text: the values are recorded, and a recording holds no dates of TOML."""
+    mesh = values.get("mesh")
+    if isinstance(mesh, dict) and isinstance(mesh.get("start_time"), date):
+        mesh["start_time"] = mesh["start_time"].isoformat()
+
+
+def _start_seconds(value: object) -> float | None:
+    try:
+        return float(Fraction(start_time_ns(value)[0], 10**9))
+    except ModelError:
+        raise Unfit from None
+
+
+NO_START: float | None = None
+START_TIME = Expected[float | None]("seconds since 1970, or a moment such as 2024-05-01T12:00:00Z", _start_seconds)
 
 
 def _named(root: Table, key: str, problems: Problems) -> dict[str, Table]:

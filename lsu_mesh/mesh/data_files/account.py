@@ -155,18 +155,18 @@ def account(
     tolerance = max(1, data.digit_ns // 2) if tolerance_ns is None else tolerance_ns
     placed = place(data, grid, last_step, nearest=nearest, tolerance_ns=tolerance)
     values, delivered = data.values, placed.is_delivered
-    used = np.unique(placed.steps[delivered])
+    used = placed.steps[delivered & ~placed.is_sharing]  # each step once
+    first, last = (int(used.min()), int(used.max())) if len(used) else (0, 0)
     index = data.time_ns if data.time_ns is not None else data.steps
     assert index is not None
     gaps = np.diff(index)
     off_grid = placed.distance_ns > np.maximum(data.time_half_ns, tolerance)
-    is_missing = np.isnan(values[delivered])
+    is_missing = np.isnan(values if delivered.all() else values[delivered])
     return Account(
         path=str(data.path), rows=data.row_count + data.blank, blank=data.blank, delivered=int(delivered.sum()),
         before=int(placed.is_before.sum()), after=int(placed.is_after.sum()), sharing=int(placed.is_sharing.sum()),
-        leaves_sharing_out=nearest, first_step=int(used[0]) if len(used) else 0,
-        last_step=int(used[-1]) if len(used) else 0, steps_used=len(used),
-        steps_without=int(used[-1] - used[0]) + 1 - len(used) if len(used) else 0,
+        leaves_sharing_out=nearest, first_step=first, last_step=last,
+        steps_used=len(used), steps_without=last - first + 1 - len(used) if len(used) else 0,
         missing_values=int(is_missing.sum()), empty_rows=int(is_missing.all(axis=1).sum()),
         duplicates=int((gaps == 0).sum()), out_of_order=data.out_of_order, span=_span(data), period=_period(data, gaps),
         largest_distance_ns=int(placed.distance_ns[delivered].max(initial=0)),
@@ -175,7 +175,7 @@ def account(
         doubts=(
             *off_grid_doubt(placed.distance_ns[off_grid & delivered], nearest),
             *period_doubt(data, grid, gaps),
-            *late_doubt(data, grid, used),
+            *late_doubt(data, grid, first),
         ),
     )  # fmt: skip
 

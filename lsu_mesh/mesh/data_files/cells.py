@@ -93,8 +93,9 @@ def _without_quotes(data: RawBytes, delimiter: int) -> RawBytes | None:
     opening, closing = at[::2], at[1::2]
     if not separator[opening].all() or not separator[np.minimum(closing + 2, len(data))].all():
         return None
-    separators = np.cumsum(separator[1:], dtype=np.int64)
-    return None if (separators[opening] != separators[closing]).any() else data[~is_quote]
+    separators = np.flatnonzero(separator[1:])
+    encloses = np.searchsorted(separators, opening) != np.searchsorted(separators, closing)
+    return None if encloses.any() else data[~is_quote]
 
 
 def _cut(data: RawBytes, starts: Integers, ends: Integers) -> CellTexts:

@@ -66,7 +66,7 @@ class Decimals:
         """The numbers as floats, to judge their size only."""
         values = self.mantissa / 10.0 ** np.minimum(self.places, 300)
         for i, value in self._long.items():
-            values[i] = float(value) if abs(value) < 10**300 else np.inf
+            values[i] = float(value) if abs(value) < 10**308 else np.inf
         return values
 
     def in_ns(self, unit_ns: int) -> tuple[Integers, Flags]:

@@ -35,6 +35,8 @@ def text_times(
     _refuse(~decimals.is_number, written, name, lines, problems, "a time")
     notes: list[str] = []
     unit_ns = find_unit(decimals.about()[decimals.is_number], name, settings, problems, notes)
+    if unit_ns is None:
+        return Times(decimals.mantissa, decimals.places, 1, ())  # of a column that is refused
     ns, fits = decimals.in_ns(unit_ns)
     if not fits.all():
         i = int(np.argmin(fits))
@@ -68,8 +70,8 @@ def _refuse(wrong: object, cells: CellTexts, name: str, lines: Integers, problem
 
 def find_unit(
     values: Vector, name: str, settings: DataFileSettings, problems: FileProblems, notes: list[str]
-) -> int:  # fmt: skip
-    """Nanoseconds of the unit of a column of numbers: as given, or by their size, which is noted."""
+) -> int | None:  # fmt: skip
+    """Nanoseconds of the unit of a column of numbers: as given, or by their size, which is noted; None: a mistake."""
     if settings.time_unit is not None:
         return TIME_UNITS[settings.time_unit]
     if not len(values):
@@ -82,7 +84,7 @@ def find_unit(
             'nor seconds from a start; say which: time_unit = "s", "ms", "us" or "ns"'
         )
         problems.add("unit", f"column {name!r}", text)
-        return TIME_UNITS["ns"]
+        return None
     if unit != "s":
         notes.append(f'times of {name!r} are read as {unit} since 1970, by their size; time_unit = "{unit}" says so')
     return TIME_UNITS[unit]

@@ -127,8 +127,9 @@ def _ordered(
     """The rows by time or step; rows of one moment stay in the order of the file."""
     index = steps if times is None else times.ns
     assert index is not None
-    order = np.argsort(index, kind="stable")
     later = np.maximum.accumulate(index) if len(index) else index
+    out_of_order = int((index < later).sum())
+    order = np.argsort(index, kind="stable") if out_of_order else slice(None)
     half = np.zeros(len(lines), dtype=np.int64) if times is None else times.half_ns[order]
     return DataFile(
         settings.path,
@@ -138,7 +139,7 @@ def _ordered(
         half,
         1 if times is None else times.digit_ns,
         None if steps is None else steps[order],
-        int((index < later).sum()),
+        out_of_order,
         blank,
         (*notes, *(times.notes if times is not None else ())),
     )

@@ -72,6 +72,8 @@ def typed_times(column: TypedColumn, settings: DataFileSettings, problems: FileP
     if unit_ns is None:
         about = data[~bad].astype(np.float64)
         unit_ns = find_unit(about, column.name, settings, problems, notes)
+    if unit_ns is None:
+        return Times(np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64), 1, ())  # it is refused
     far = np.abs(data.astype(np.float64)) * unit_ns >= MAX_TIME_NS
     _refuse(far, column, problems, "is beyond ±146 years from 1970 in nanoseconds; is time_unit right?")
     data = np.where(far, np.zeros(1, data.dtype), data)

@@ -65,12 +65,12 @@ def off_grid_doubt(distances_ns: NDArray[np.int64], nearest: bool) -> tuple[str,
     return (f"rows lie off the grid ({len(distances_ns)}, by up to {far}) and are taken as measured at their step",)
 
 
-def late_doubt(data: DataFile, grid: Grid, used: NDArray[np.int64]) -> tuple[str, ...]:
+def late_doubt(data: DataFile, grid: Grid, first_step: int) -> tuple[str, ...]:
     """A first row far inside the run: start_time is probably not that of the file."""
-    if data.time_ns is None or not len(used) or used[0] <= max(LONG_BEFORE, 10 * data.row_count):
+    if data.time_ns is None or first_step <= max(LONG_BEFORE, 10 * data.row_count):
         return ()
     start = proposed_start(int(data.time_ns[0]), grid)
-    return (f"the first row is step {used[0]}; start_time = {start} makes it step 1",)
+    return (f"the first row is step {first_step}; start_time = {start} makes it step 1",)
 
 
 def period_doubt(data: DataFile, grid: Grid, gaps: NDArray[np.int64]) -> tuple[str, ...]:
