@@ -139,13 +139,19 @@ def test_multiples_of_a_period(made: type[Filter]) -> None:
     np.testing.assert_array_equal(filter.bounds(), before)
 
 
-@given(st.integers(-50, 50), st.floats(0.0, 6.28), st.floats(1e-9, 1.0), st.sampled_from([2 * math.pi, 360.0, 0.1]))
-@settings(max_examples=150, deadline=None)
-def test_the_true_multiple_is_always_kept(turns: int, rest: float, r: float, period: float) -> None:
+@given(
+    st.integers(-50, 50),
+    st.floats(0.0, 6.28),
+    st.sampled_from([0.0, 1e-15, 1e-9, 0.03]),
+    st.sampled_from([-1, 1]),
+    st.sampled_from([2 * math.pi, 360.0, 0.1]),
+)
+@settings(max_examples=300, deadline=None)
+def test_the_true_multiple_is_always_kept(turns: int, rest: float, r: float, sign: int, period: float) -> None:
     """2π means 2π: with an exact turn of 2π (to 40 digits) the truth stays inside."""
     pi = Fraction(31415926535897932384626433832795028841971, 10**40)
     turn = 2 * pi if period == 2 * math.pi else Fraction(period)
-    truth = turns * turn + Fraction(rest)  # the state; the sensor says ``rest``
+    truth = turns * turn + Fraction(rest) + sign * Fraction(r)  # the state; the sensor says ``rest``
     middle = float(truth)
     reach = 0.4 * period
     model = LSUModel([[1.0]], None, [[1.0]], 0.0, r, period=period)
