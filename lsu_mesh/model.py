@@ -127,7 +127,10 @@ class LSUModel:
         self.inputs = names_argument("inputs", inputs, p, default="u", problems=problems)
         self.outputs = names_argument("outputs", outputs, m, default="y", problems=problems)
         self.units = names_argument("units", units, n, default="", problems=problems)
+        self.has_plain_outputs = self.D is None and self.d is None and self.period is None
+        """Whether ``y = C x + v``: no feedthrough, offset or period."""
         self.flow: ContinuousModel | None = None
+        """Of a discretised model: the continuous one."""
         if problems:
             raise ModelError(*problems)
 
@@ -155,11 +158,6 @@ class LSUModel:
     def output_count(self) -> int:
         """m"""
         return int(self.C.shape[0])
-
-    @property
-    def has_plain_outputs(self) -> bool:
-        """Whether ``y = C x + v``: no feedthrough, offset or period."""
-        return self.D is None and self.d is None and self.period is None
 
     def replace(self, **changes: object) -> LSUModel:
         """A copy with some arguments changed; names are kept where they still fit.

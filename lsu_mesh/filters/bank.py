@@ -176,13 +176,12 @@ def _stack(models: Sequence[LSUModel]) -> batch_run.Models:
     if len(shapes) > 1 or len(with_domain) not in (0, len(models)):
         raise ModelError("the models of a bank must have equal shapes, and all of them a domain or none")
     domains = np.array([box.bounds() for box in with_domain]) if with_domain else np.zeros((len(models), 0, n))
-    widths = [np.concatenate([one.rho, np.zeros(one.G.shape[1] - one.rho.size)]) for one in arrays]
     return batch_run.Models(
         A=np.array([one.A for one in arrays]),
         B=np.array([one.B for one in arrays]),
         C=np.array([one.C for one in arrays]),
         G=np.array([one.G for one in arrays]),
-        widths=np.array(widths),
+        widths=np.array([one.widths for one in arrays]),
         r=np.array([one.r for one in arrays]),
         domains=domains,
     )

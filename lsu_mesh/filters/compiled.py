@@ -13,8 +13,9 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
-from lsu_mesh.filters.plain_outputs import PlainStrips, plain_strips, shifted
+from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.validation import (
+    KernelModel,
     checked_prior,
     driven,
     kernel_model,
@@ -76,8 +77,7 @@ class CompiledFilter(Filter):
         return self._describe(self._state)[3]
 
     def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
-        used = same_states(self._model, model)
-        arrays = self._arrays if model is None else step_arrays(used)
+        used, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
         return shifted(self._predict_output(arrays.C, arrays.r), used, u)
 
     def update(
@@ -87,12 +87,11 @@ class CompiledFilter(Filter):
         model: LSUModel | None = None,
         u: ArrayLike | Orthotope | None = None,
     ) -> Support:
-        used = same_states(self._model, model)
-        arrays = self._arrays if model is None else step_arrays(used)
-        strips = plain_strips(used, arrays.C, arrays.r, y, r, u, self._image)
-        state, status = self._cut(self._state, strips.C, strips.y, strips.r)
+        used, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
+        strips = plain_strips(used, arrays, y, r, u, self._image)
+        state, status = self._cut(self._state, arrays.C, *strips)
         if status > 0:
-            raise self._contradiction(strips, status)
+            raise self._contradiction(used, arrays.C, *strips, status)
         self._accept(state, status)
         return self.support
 
@@ -102,8 +101,7 @@ class CompiledFilter(Filter):
         rho: ArrayLike | None = None,
         model: LSUModel | None = None,
     ) -> Support:
-        step_model = same_states(self._model, model)
-        arrays = self._arrays if model is None else step_arrays(step_model)
+        step_model, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
         center, widths = driven(step_model, arrays, u, rho, self.bounds)
         work = self._work if widths.size == self._arrays.G.shape[1] else self._scratch(widths.size)
         state = np.empty_like(self._state)
@@ -164,7 +162,7 @@ class CompiledFilter(Filter):
             B=a.B[np.newaxis],
             C=a.C[np.newaxis],
             G=a.G[np.newaxis],
-            widths=np.concatenate([a.rho, np.zeros(a.G.shape[1] - a.rho.size)])[np.newaxis],
+            widths=a.widths[np.newaxis],
             r=a.r[np.newaxis],
             domains=np.zeros((1, 0, len(a.A))) if domain is None else np.array([domain.bounds()]),
         )
@@ -175,6 +173,9 @@ class CompiledFilter(Filter):
         )  # fmt: skip
         self._state = states[0]
         return int(outcome[0, 0]), int(outcome[0, 1])
+
+    def _of_step(self, model: LSUModel) -> tuple[LSUModel, KernelModel]:
+        return same_states(self._model, model), step_arrays(model)
 
     def _scratch(self, noise_columns: int) -> Scratch:
         return scratch(self._model.state_count, noise_columns)
@@ -221,12 +222,11 @@ class CompiledFilter(Filter):
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
         self._state = state
 
-    def _contradiction(self, strips: PlainStrips, status: int) -> InconsistentData:
+    def _contradiction(self, model: LSUModel, C: Matrix, y: Vector, r: Vector, status: int) -> InconsistentData:
         """Names the strips up to the one that proved the contradiction."""
-        C, y, r, names = strips
         interval = self._predict_output(C, r)
         return strip_contradiction(
-            names[:status],
+            model.outputs[:status],
             interval.lower[:status],
             interval.upper[:status],
             y=y[:status],

@@ -109,11 +109,10 @@ class Kalman(Filter):
         """Data update with y (m,), NaN where missing; it never contradicts, a period's nearest multiple is taken."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        strips = plain_strips(used, arrays.C, arrays.r, y, r, u, self._mean_output, is_strict=False)
-        known = ~np.isnan(strips.y)
+        values, widths = plain_strips(used, arrays, y, r, u, self._mean_output, is_strict=False)
+        known = ~np.isnan(values)
         if known.any():
-            variances = uniform_variance(strips.r)
-            self._held = corrected(self._held, strips.C[known], strips.y[known], variances[known])
+            self._held = corrected(self._held, arrays.C[known], values[known], uniform_variance(widths)[known])
         return self.support
 
     def predict(

@@ -149,14 +149,14 @@ class LSUCZ(Filter):
         """Data update: one generator and one constraint per strip, then reduction (P2023 (15))."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        C, values, widths, names = plain_strips(used, arrays.C, arrays.r, y, r, u, self._image)
+        C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r, u, self._image)
         if not np.isnan(values).all():
             c, G, A, b = self._held.body
             cut = (c, *meet_strips(c, G, A, b, C, values, widths))
             try:
                 self._hold(self._settled(cut, self._held.lower, self._held.upper))
             except InconsistentData as contradiction:
-                raise strip_contradiction(names, *self._image(C), values, widths) from contradiction
+                raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
         return self.support
 
     def predict(

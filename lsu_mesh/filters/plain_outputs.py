@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +11,7 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
-from lsu_mesh.filters.validation import half_width_vector, input_interval, output_vector
+from lsu_mesh.filters.validation import KernelModel, half_width_vector, input_interval, output_vector
 from lsu_mesh.kernels import plain_outputs as kernels
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -21,28 +20,19 @@ Image = Callable[[Matrix], tuple[Vector, Vector]]
 """Bounds (m,), (m,) of ``C x`` over a filter's set."""
 
 
-class PlainStrips(NamedTuple):
-    """``|y − C x| ≤ r``: C (m, n), y (m,) with NaN for no strip, r (m,), and the names of the outputs."""
-
-    C: Matrix
-    y: Vector
-    r: Vector
-    names: tuple[str, ...]
-
-
 def plain_strips(
     model: LSUModel,
-    C: Matrix,
-    default_r: Vector,
+    arrays: KernelModel,
     y: ArrayLike,
     r: ArrayLike | None,
     u: ArrayLike | Orthotope | None,
     image: Image,
     is_strict: bool = True,
-) -> PlainStrips:
-    """The strips of y (m,): ``y − d − D u`` with its rounding in r, and the multiples of the periods that can be.
+) -> tuple[Vector, Vector]:
+    """y (m,), NaN for no strip, and r (m,) of the strips ``|y − C x| ≤ r`` that the data y (m,) are.
 
-    C (m, n), default_r (m,) are the model's. A plain model gives y and r back, bit by bit.
+    ``y − d − D u`` with its rounding in r, and the multiples of the periods that can be. A plain model gives y and r
+    back, bit by bit.
 
     Raises
     ------
@@ -51,18 +41,18 @@ def plain_strips(
         nearest is taken.
     """
     values = output_vector(y, model.output_count)
-    widths = half_width_vector("r", r, default_r)
+    widths = half_width_vector("r", r, arrays.r)
     if model.has_plain_outputs:
-        return PlainStrips(C, values, widths, model.outputs)
+        return values, widths
     shift, spread = _shift(model, u)
     period = np.zeros(values.size) if model.period is None else np.array(model.period)
-    low, high = image(C) if period.any() else (np.zeros(values.size), np.zeros(values.size))
+    low, high = image(arrays.C) if period.any() else (np.zeros(values.size), np.zeros(values.size))
     plain_y, plain_r = np.empty_like(values), np.empty_like(values)
     low, high = np.array(low), np.array(high)
     missed = kernels.plain_strips(values, widths, shift, spread, period, low, high, plain_y, plain_r)
     if missed and is_strict:
         raise strip_contradiction(model.outputs, low, high, np.where(period > 0, plain_y, np.nan), plain_r)
-    return PlainStrips(C, plain_y, plain_r, model.outputs)
+    return plain_y, plain_r
 
 
 def shifted(prediction: OutputPrediction, model: LSUModel, u: ArrayLike | Orthotope | None) -> OutputPrediction:

@@ -21,7 +21,8 @@ class KernelModel(NamedTuple):
     """A model as kernels take it: writable, contiguous, no ``None``.
 
     A (n, n), ``B = [B  a]`` (n, p + 1), or (n, p) without offset, C (m, n), ``G = [N  B]`` (n, q + p) with the columns
-    of everything unknown, rho (q,), r (m,). With radii the last n columns of N are the identity.
+    of everything unknown, rho (q,), r (m,), and widths (q + p,) of the columns of G where the input is known. With
+    radii the last n columns of N are the identity.
     """
 
     A: Matrix
@@ -30,6 +31,7 @@ class KernelModel(NamedTuple):
     G: Matrix
     rho: Vector
     r: Vector
+    widths: Vector
 
 
 def kernel_model(model: LSUModel) -> KernelModel:
@@ -47,6 +49,7 @@ def kernel_model(model: LSUModel) -> KernelModel:
         G=np.ascontiguousarray(np.hstack([N, B])),
         rho=rho,
         r=np.array(model.r),
+        widths=np.concatenate([rho, np.zeros(model.input_count)]),
     )
 
 
@@ -56,35 +59,29 @@ def step_arrays(model: LSUModel) -> KernelModel:
     return kernel_model(model)
 
 
-class Driven(NamedTuple):
-    """What drives a time update: u (p,), or (p + 1,) with the 1 of an offset; the widths (q + p,) of G's columns."""
-
-    u: Vector
-    widths: Vector
-
-
 def driven(
     model: LSUModel,
     arrays: KernelModel,
     u: ArrayLike | Orthotope | None,
     rho: ArrayLike | None,
     bounds: Callable[[], tuple[Vector, Vector]],
-) -> Driven:
-    """The input and the half-widths of all that is unknown in a step from a set with these bounds.
+) -> tuple[Vector, Vector]:
+    """What drives a step from a set with these bounds: u (p,), a last 1 for the offset; the widths (q + p,) of G.
 
-    Where the model has radii, what they charge, ``radii.A |x| + radii.B |u| + radii.a``, is among them.
+    Where the model has radii, what they charge, ``radii.A |x| + radii.B |u| + radii.a``, is among the widths.
     """
-    center, half_widths = input_interval(u, model.input_count)
-    given = half_width_vector("rho", rho, arrays.rho[: model.rho.size])
-    if given.size < arrays.rho.size:
-        given = np.concatenate([given, np.zeros(arrays.rho.size - given.size)])
-    widths = np.concatenate([given, half_widths])
+    if rho is None and not isinstance(u, Orthotope):
+        center, widths = input_vector(u, model.input_count), arrays.widths
+    else:
+        center, half_widths = input_interval(u, model.input_count)
+        given = half_width_vector("rho", rho, arrays.rho[: model.rho.size])
+        widths = np.concatenate([given, np.zeros(arrays.rho.size - given.size), half_widths])
     if model.radii is not None:
-        lower, upper = bounds()
-        first = arrays.rho.size - lower.size
         A, B, a = (np.array(radius) for radius in model.radii)
-        charge(A, B, a, np.array(lower), np.array(upper), center, half_widths, widths, first)
-    return Driven(center if model.a is None else np.append(center, 1.0), widths)
+        lower, upper = (np.array(side) for side in bounds())
+        widths, n, q = np.array(widths), lower.size, arrays.rho.size
+        charge(A, B, a, lower, upper, center, widths[q:].copy(), widths, q - n)
+    return center if model.a is None else np.append(center, 1.0), widths
 
 
 def with_offset(model: LSUModel, U: Matrix) -> Matrix:
@@ -123,14 +120,19 @@ def input_interval(u: ArrayLike | Orthotope | None, size: int) -> tuple[Vector, 
 
     Raises ``ModelError`` where an input is needed and missing, or of wrong length.
     """
-    if u is None:
-        if size:
-            raise ModelError(f"the model has {size} input(s): give u, or an Orthotope that holds the unknown input")
-        return np.zeros(0), np.zeros(0)
     if isinstance(u, Orthotope):
         if u.dim != size:
             raise ModelError(f"the box of inputs must have {size} coordinates, it has {u.dim}")
         return np.array(u.center), np.array(u.half_widths)
+    return input_vector(u, size), np.zeros(size)
+
+
+def input_vector(u: ArrayLike | None, size: int) -> Vector:
+    """u (p,); ``ModelError`` where it is needed and missing, or of wrong length."""
+    if u is None:
+        if size:
+            raise ModelError(f"the model has {size} input(s): give u, or an Orthotope that holds the unknown input")
+        return np.zeros(0)
     values = np.array(u, dtype=np.float64)
     if values.ndim == 0 and size == 1:
         values = values.reshape(1)
@@ -138,7 +140,7 @@ def input_interval(u: ArrayLike | Orthotope | None, size: int) -> tuple[Vector, 
         raise ModelError(f"u must have {size} entries, one per input, it has shape {values.shape}")
     if not np.isfinite(values).all():
         raise ModelError(f"u must be finite (a missing input is an Orthotope), it is {values.tolist()}")
-    return values, np.zeros(size)
+    return values
 
 
 def same_states(model: LSUModel, step_model: LSUModel | None) -> LSUModel:

@@ -131,12 +131,12 @@ class ZonotopicKalman(Filter):
         """Data update with the optimal gain; in the predictor form the data wait for :meth:`predict`."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        C, values, widths, names = plain_strips(used, arrays.C, arrays.r, y, r, u, self._image)
+        C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r, u, self._image)
         known = ~np.isnan(values)
         if known.any():
             strips = Strips(np.array(C[known]), values[known], widths[known])
             if self._excludes(strips):
-                raise strip_contradiction(names, *self._image(C), values, widths)
+                raise strip_contradiction(used.outputs, *self._image(C), values, widths)
             if self._form == "filter":
                 self._held = _corrected(self._held, strips)
             else:

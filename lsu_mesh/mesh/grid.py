@@ -67,7 +67,7 @@ class Grid:
         if not self._fits(k, p, q):
             return np.array([self.time_of(one) for one in k.tolist()], dtype=np.int64)
         if q == 1:
-            on_whole_ns: Int = self.start_ns + k * p
+            on_whole_ns: Integers = self.start_ns + k * p
             return on_whole_ns
         whole, rest = np.divmod(k, q)
         part, over = np.divmod(rest * p, q)
