@@ -72,7 +72,7 @@ def period_argument(value: ArrayLike | Sequence[float | None] | None, size: int,
         return None
     entries = [0.0 if entry is None else entry for entry in np.atleast_1d(np.array(value, dtype=object)).tolist()]
     entries = entries * size if np.ndim(np.array(value, dtype=object)) == 0 else entries
-    periods = offset_argument("period", entries, size, "output", problems)
+    periods = offset_argument("period", entries, size, of="output", problems=problems)
     if periods is not None and (periods < 0).any():
         problems.append(f"period must be above 0, or 0 (or None) where there is none, it is {periods.tolist()}")
     return periods

@@ -56,7 +56,7 @@ class ContinuousSimulation(Simulation):
         row, rest = divmod(time_ns, self.dt_ns)
         if not 1 <= row <= len(self.X):
             raise ModelError(f"the simulation goes from {self.dt_ns} to {(len(self.X) + 1) * self.dt_ns - 1} ns")
-        return flow_state(self.flow, self.X[row - 1], self.U[row - 1], self.units[row - 1], rest)
+        return flow_state(self.flow, self.X[row - 1], self.U[row - 1], unit=self.units[row - 1], h_ns=rest)
 
     def input_at(self, time_ns: int) -> Vector:
         """The input (p,) that acts from this moment on."""
@@ -244,7 +244,11 @@ def simulate(
         X[k] = x
         Y[k] = measured(rates, x, U[k], unit_noise(noise, seed, "output", step=step, size=m))
         units[k] = unit_noise(noise, seed, "process", step=step, size=q)
-        x = next_state(rates, x, U[k], units[k]) if flow is None else flow_state(flow, x, U[k], units[k], dt_ns or 0)
+        x = (
+            next_state(rates, x, U[k], units[k])
+            if flow is None
+            else flow_state(flow, x, U[k], unit=units[k], h_ns=dt_ns or 0)
+        )
     if flow is None:
         return Simulation(X, Y, U)
     run = ContinuousSimulation(X, Y, U)

@@ -88,7 +88,7 @@ class CompiledFilter(Filter):
         u: ArrayLike | Orthotope | None = None,
     ) -> Support:
         used, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
-        strips = plain_strips(used, arrays, y, r, u, self._image)
+        strips = plain_strips(used, arrays, y, r=r, u=u, image=self._image)
         state, status = self._cut(self._state, arrays.C, *strips)
         if status > 0:
             raise self._contradiction(used, arrays.C, *strips, status)
@@ -102,7 +102,7 @@ class CompiledFilter(Filter):
         model: LSUModel | None = None,
     ) -> Support:
         step_model, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
-        center, widths = driven(step_model, arrays, u, rho, self.bounds)
+        center, widths = driven(step_model, arrays, u, rho=rho, bounds=self.bounds)
         work = self._work if widths.size == self._arrays.G.shape[1] else self._scratch(widths.size)
         state = np.empty_like(self._state)
         status = filter_step.advance(

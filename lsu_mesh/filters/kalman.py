@@ -109,7 +109,7 @@ class Kalman(Filter):
         """Data update with y (m,), NaN where missing; it never contradicts, a period's nearest multiple is taken."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        values, widths = plain_strips(used, arrays, y, r, u, self._mean_output, is_strict=False)
+        values, widths = plain_strips(used, arrays, y, r=r, u=u, image=self._mean_output, is_strict=False)
         known = ~np.isnan(values)
         if known.any():
             self._held = corrected(self._held, arrays.C[known], values[known], uniform_variance(widths)[known])
@@ -124,7 +124,7 @@ class Kalman(Filter):
         """Time update; an interval of inputs counts as uniform noise."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        center, widths = driven(used, arrays, u, rho, self.bounds)
+        center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
         mean, P = self._held
         noise = (arrays.G * uniform_variance(widths)) @ arrays.G.T
         self._held = Gaussian(arrays.A @ mean + arrays.B @ center, arrays.A @ P @ arrays.A.T + noise)

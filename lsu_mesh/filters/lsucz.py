@@ -149,7 +149,7 @@ class LSUCZ(Filter):
         """Data update: one generator and one constraint per strip, then reduction (P2023 (15))."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r, u, self._image)
+        C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r=r, u=u, image=self._image)
         if not np.isnan(values).all():
             c, G, A, b = self._held.body
             cut = (c, *meet_strips(c, G, A, b, C, values, widths))
@@ -168,7 +168,7 @@ class LSUCZ(Filter):
         """Time update ``A X ⊕ B u ⊕ N box(rho)`` (P2023 (16)), met with ``model.domain`` where it exceeds it."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        center, widths = driven(used, arrays, u, rho, self.bounds)
+        center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
         body, (lower, upper) = self._held.body, self.bounds()
         if not self._limits.allow(body):
             body, lower, upper, _ = self._settled(body, lower, upper)

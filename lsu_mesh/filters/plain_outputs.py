@@ -51,7 +51,7 @@ def plain_strips(
     low, high = np.array(low), np.array(high)
     missed = kernels.plain_strips(values, widths, shift, spread, period, low, high, plain_y, plain_r)
     if missed and is_strict:
-        raise strip_contradiction(model.outputs, low, high, np.where(period > 0, plain_y, np.nan), plain_r)
+        raise strip_contradiction(model.outputs, low, high, y=np.where(period > 0, plain_y, np.nan), r=plain_r)
     return plain_y, plain_r
 
 

@@ -70,7 +70,16 @@ def run_filter(
     inputs = _inputs(U, len(outputs), filter.model.input_count, needs_last)
     run = blank_run(len(outputs), filter.model.state_count, filter.model.output_count, filter.guarantee)
     if times is not None or models is not None:
-        rows = Rows(outputs, inputs, times, models, time_errors, dt_ns, rate, off_grid)
+        rows = Rows(
+            Y=outputs,
+            U=inputs,
+            times=times,
+            models=models,
+            time_errors=time_errors,
+            dt_ns=dt_ns,
+            rate=rate,
+            off_grid=off_grid,
+        )
         return run_rows(filter, rows, run)
     if np.any(time_errors) or dt_ns is not None or rate is not None:
         raise ModelError("time_errors, dt_ns and rate need times")

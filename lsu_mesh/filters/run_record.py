@@ -37,8 +37,8 @@ class FilterRun(Tables):
 def blank_run(rows: int, n: int, m: int, guarantee: Guarantee) -> FilterRun:
     """A run of so many rows, to be filled."""
     run = FilterRun(
-        np.empty((rows, n)), np.empty((rows, n)), np.empty((rows, n)), np.empty(rows),
-        np.empty((rows, m)), np.empty((rows, m)), np.empty((rows, m)),
+        points=np.empty((rows, n)), lower=np.empty((rows, n)), upper=np.empty((rows, n)), volumes=np.empty(rows),
+        y_lower=np.empty((rows, m)), y_upper=np.empty((rows, m)), y_points=np.empty((rows, m)),
     )  # fmt: skip
     run.guarantee = guarantee
     return run

@@ -62,7 +62,7 @@ def time_widening(
     true statement on x(t) at the nominal t. Where D ≠ 0 update with the hull of the inputs as a box besides. ``None``
     where there is no such box: subdivide, or leave the data out.
     """
-    box = state_box(flow, lower, upper, error_ns, u)
+    box = state_box(flow, lower, upper, error_ns=error_ns, u=u)
     if box is None:
         return None
     center, half_widths = _with_offset(flow.rates, *input_interval(u, flow.input_count))

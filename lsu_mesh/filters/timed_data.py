@@ -110,7 +110,7 @@ def bring(
         if not start_ns < datum.time_ns < end_ns:
             raise ModelError(f"the datum at {datum.time_ns} ns does not lie between {start_ns} and {end_ns} ns")
         try:
-            carry(filter, flow, now, datum.time_ns, inputs)
+            carry(filter, flow, now, end_ns=datum.time_ns, inputs=inputs)
             if not cut(filter, flow, datum, inputs):
                 unused.append(datum)
         except InconsistentData as error:
@@ -119,7 +119,7 @@ def bring(
             raise InconsistentData(f"{where}: {error}", error.rows, error.gap) from error
         now = datum.time_ns
     try:
-        carry(filter, flow, now, end_ns, inputs)
+        carry(filter, flow, now, end_ns=end_ns, inputs=inputs)
     except InconsistentData:
         filter.restore(before)
         raise
@@ -137,10 +137,10 @@ def contradicting(
     before, now = filter.snapshot(), start_ns
     try:
         for datum in ordered(data):
-            carry(filter, flow, now, datum.time_ns, inputs)
+            carry(filter, flow, now, end_ns=datum.time_ns, inputs=inputs)
             now = datum.time_ns
             carried = filter.snapshot()
-            rows = tuple(i for i in range(len(datum.y)) if _misses(filter, flow, datum, i, inputs))
+            rows = tuple(i for i in range(len(datum.y)) if _misses(filter, flow, datum, row=i, inputs=inputs))
             filter.restore(carried)
             if rows:
                 found.append((datum, rows))
@@ -153,7 +153,15 @@ def _misses(filter: Filter, flow: ContinuousModel, datum: TimedDatum, row: int, 
     """Whether one strip alone is proved to miss the set."""
     y = np.full(len(datum.y), np.nan)
     y[row] = datum.y[row]
-    alone = TimedDatum(datum.time_ns, y, datum.error_ns, datum.outputs, datum.r, datum.sensor, datum.row)
+    alone = TimedDatum(
+        time_ns=datum.time_ns,
+        y=y,
+        error_ns=datum.error_ns,
+        outputs=datum.outputs,
+        r=datum.r,
+        sensor=datum.sensor,
+        row=datum.row,
+    )
     before = filter.snapshot()
     try:
         cut(filter, flow, alone, inputs)

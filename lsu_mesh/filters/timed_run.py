@@ -46,14 +46,16 @@ def run_rows(filter: Filter, rows: Rows, run: FilterRun) -> FilterRun:
     errors = _errors(rows.time_errors, len(times))
     flows = [model if isinstance(model, ContinuousModel) else model.flow for model in models]
     if all(flow is not None for flow in flows):
-        return _run_continuous(filter, rows, [flow for flow in flows if flow is not None], times, errors, run)
+        return _run_continuous(
+            filter, rows, [flow for flow in flows if flow is not None], times=times, errors=errors, run=run
+        )
     if rows.models is not None:
         raise ModelError("models with times must be continuous ones: LSUModel.continuous(…)")
     if rows.dt_ns is None or rows.dt_ns <= 0:
         raise ModelError("a discrete model knows no time: give dt_ns, the length of its step, or a continuous model")
     if rows.off_grid == "nearest" and rows.rate is None:
         run.guarantee = "none"
-    return _run_on_grid(filter, rows, times, errors, rows.dt_ns, run)
+    return _run_on_grid(filter, rows, times, errors=errors, dt_ns=rows.dt_ns, run=run)
 
 
 def _models(filter: Filter, rows: Rows) -> list[LSUModel | ContinuousModel]:
@@ -119,7 +121,7 @@ def _run_continuous(
             filter.update(rows.Y[k], r, model=outputs, u=u)
             store_set(run, k, filter)
             if k + 1 < len(times):
-                carry(filter, flow, time, times[k + 1], inputs)
+                carry(filter, flow, time, end_ns=times[k + 1], inputs=inputs)
         except LsuMeshError as error:
             raise named_row(k, error) from error
     return run
@@ -138,7 +140,7 @@ def _run_on_grid(
         around = (rows.U[max(0, k - 1)] if has_inputs else None, u)
         try:
             r = grid_half_widths(
-                model, None, time, errors[k], at, rate=rows.rate, off_grid=rows.off_grid, inputs=around
+                model, None, time, error_ns=errors[k], step_ns=at, rate=rows.rate, off_grid=rows.off_grid, inputs=around
             )
             store_output(run, k, _widened(filter.predict_output(u), r, model.r))
             filter.update(rows.Y[k], r, u=u)

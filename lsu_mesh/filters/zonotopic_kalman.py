@@ -131,7 +131,7 @@ class ZonotopicKalman(Filter):
         """Data update with the optimal gain; in the predictor form the data wait for :meth:`predict`."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r, u, self._image)
+        C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r=r, u=u, image=self._image)
         known = ~np.isnan(values)
         if known.any():
             strips = Strips(np.array(C[known]), values[known], widths[known])
@@ -153,7 +153,7 @@ class ZonotopicKalman(Filter):
         """Time update ``A X ⊕ B u ⊕ N box(rho)``, reduced; :meth:`bounds` are met with ``model.domain``."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        center, widths = driven(used, arrays, u, rho, self.bounds)
+        center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
         held = _corrected(self._held, self._held.pending)
         body = (held.c, held.H, np.zeros((0, held.H.shape[1])), np.zeros(0))
         finite, moved, lower, upper = predict_constrained(

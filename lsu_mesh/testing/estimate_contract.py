@@ -24,7 +24,7 @@ def check_estimates(make: Callable[[LSUModel, Orthotope], Filter], seeds: Iterab
         A *= 0.8 / max(1e-9, np.abs(np.linalg.eigvals(A)).max())
         B = rng.normal(size=(n, 1)) if seed % 2 else None
         domain = Orthotope([-DOMAIN] * n, [DOMAIN] * n)
-        model = LSUModel(A, B, rng.normal(size=(m, n)), 0.1, 0.2, domain=domain)
+        model = LSUModel(A=A, B=B, C=rng.normal(size=(m, n)), rho=0.1, r=0.2, domain=domain)
         filter = make(model, Orthotope([-1.0] * n, [1.0] * n))
         witness = Witness(filter, f"{type(filter).__name__}, an estimate with {n} states, seed {seed}")
         data = simulate(model, steps, seed, x1=np.zeros(n))

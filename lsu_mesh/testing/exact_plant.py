@@ -48,7 +48,7 @@ def draw_case(rng: np.random.Generator, kind: str) -> Case:
         A = rng.integers(-2, 3, size=(n, n)) / 2.0
         C = rng.integers(-2, 3, size=(m, n)) / 2.0
         rho, r = rng.choice([0.0, 0.5, 1.0], size=n), rng.choice([0.0, 0.25], size=m)
-        return Case(LSUModel(A, None, C, rho, r), Orthotope(-np.ones(n), np.ones(n)), False)
+        return Case(LSUModel(A=A, B=None, C=C, rho=rho, r=r), Orthotope(-np.ones(n), np.ones(n)), False)
     A = rng.normal(size=(n, n))
     A *= {"unstable": 1.3}.get(kind, 0.9) / max(1e-9, np.abs(np.linalg.eigvals(A)).max())
     if kind == "singular":
@@ -74,7 +74,7 @@ def draw_case(rng: np.random.Generator, kind: str) -> Case:
         A, C = A * units[:, None] / units, C * output_units[:, None] / units
         B = None if B is None else B * units[:, None]
         rho, r, center, widths = rho * units, r * output_units, center * units, widths * units
-    model = LSUModel(A, B, C, rho, r, noise_map)
+    model = LSUModel(A=A, B=B, C=C, rho=rho, r=r, noise_map=noise_map)
     return Case(model, Orthotope(center - widths, center + widths), bool(rng.random() < 0.3))
 
 
@@ -86,7 +86,7 @@ def exact_steps(case: Case, rng: np.random.Generator, steps: int) -> Iterator[St
         y = measured(model.C, model.r, x, unit_noise(rng, model.output_count, case.inside))
         u = rng.normal(size=model.input_count)
         yield Step(x, y, u)
-        x = next_state(model, x, u, model.rho, unit_noise(rng, model.rho.size, case.inside))
+        x = next_state(model, x, u, rho=model.rho, noise=unit_noise(rng, model.rho.size, case.inside))
 
 
 def start(case: Case, rng: np.random.Generator) -> Exact:

@@ -75,7 +75,7 @@ def draw_problem(seed: int, steps: int) -> Problem:
     model = case.model
     if kind == "domain":
         model = model.replace(domain=box_around([moment.x for moment in path]))
-    return Problem(kind, seed, model, case.prior, tuple(path))
+    return Problem(kind=kind, seed=seed, model=model, prior=case.prior, path=tuple(path))
 
 
 def _draw_moment(rng: np.random.Generator, kind: str, case: Case, x: Exact) -> tuple[Moment, Exact]:
@@ -96,7 +96,9 @@ def _draw_moment(rng: np.random.Generator, kind: str, case: Case, x: Exact) -> t
         told = Orthotope(np.minimum(u, end), np.maximum(u, end))
     used = other or model
     noise = unit_noise(rng, model.rho.size, case.inside)
-    return Moment(x, y, r, told, rho, other), next_state(used, x, u, used.rho if rho is None else rho, noise)
+    return Moment(x=x, y=y, r=r, u=told, rho=rho, model=other), next_state(
+        used, x, u, rho=used.rho if rho is None else rho, noise=noise
+    )
 
 
 def around(x: Exact, shape: str, widths: Vector, own: Support, rng: np.random.Generator) -> Support | None:
@@ -115,7 +117,7 @@ def around(x: Exact, shape: str, widths: Vector, own: Support, rng: np.random.Ge
     if shape == "box":
         return box
     if shape in ("intersection", "constrained zonotope"):
-        body = around(x, "parallelotope", widths, own, rng)
+        body = around(x, "parallelotope", widths, own=own, rng=rng)
         if body is None:
             return None
         return Intersection([body, box]) if shape == "intersection" else body.intersect(box)

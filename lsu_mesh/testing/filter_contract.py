@@ -56,7 +56,9 @@ def check_filter(make: Make, seeds: int | Iterable[int] = SEEDS, steps: int = 5,
     A filter with ``guarantee = "none"`` is checked for what it promises only: shapes, finite numbers, snapshots, and
     the state kept after an error.
     """
-    probe = make(LSUModel([[1.0]], None, [[1.0]], 0.1, 0.1, domain=([-9.0], [9.0])), Orthotope([-1.0], [1.0]))
+    probe = make(
+        LSUModel(A=[[1.0]], B=None, C=[[1.0]], rho=0.1, r=0.1, domain=([-9.0], [9.0])), Orthotope([-1.0], [1.0])
+    )
     if not isinstance(probe, Filter):
         raise AssertionError(f"make(model, prior) gives {probe!r}; expected a Filter")
     chosen = range(seeds) if isinstance(seeds, int) else seeds
@@ -125,10 +127,10 @@ class _Run:
         before = self._filter.bounds()
         shape = str(self._rng.choice(SHAPES))
         own = self._filter.support
-        other = around(x, shape, before[1] - before[0], own, self._rng)
+        other = around(x, shape, before[1] - before[0], own=own, rng=self._rng)
         if other is None:
             return
-        points = common_points(x, own, before, other, self._rng) if len(x) <= MAX_ENUMERATED else []
+        points = common_points(x, own, before, other=other, rng=self._rng) if len(x) <= MAX_ENUMERATED else []
         for count in range(1, TRANSFERS + 1):
             self._witness.action = f"condition on a {shape}, time {count}"
             self._transfer(other, x)

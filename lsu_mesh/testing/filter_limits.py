@@ -22,9 +22,9 @@ def check_limits(make: Make) -> None:
     """Overflow ends in ``UnboundedSupport``, a missed domain in ``InconsistentData``; the state is kept either way."""
     for n in (1, 2, 4):
         rotation = np.roll(np.eye(n), 1, axis=0)
-        _check_overflow(make, LSUModel(GROWTH * rotation, None, np.eye(n), 0.1, 0.1), "a growing state")
-        _check_overflow(make, LSUModel(rotation, None, np.eye(n), 1.7e308, 0.1), "growing noise")
-        _check_missed_domain(make, LSUModel(0.5 * rotation, None, np.eye(n), 0.1, 0.1))
+        _check_overflow(make, LSUModel(A=GROWTH * rotation, B=None, C=np.eye(n), rho=0.1, r=0.1), "a growing state")
+        _check_overflow(make, LSUModel(A=rotation, B=None, C=np.eye(n), rho=1.7e308, r=0.1), "growing noise")
+        _check_missed_domain(make, LSUModel(A=0.5 * rotation, B=None, C=np.eye(n), rho=0.1, r=0.1))
 
 
 def _check_overflow(make: Make, model: LSUModel, kind: str) -> None:

@@ -145,7 +145,7 @@ class _Check:
             if len(sources) < self._faults:
                 center = [v + Fraction(s) for v, s in zip(x, self._rng.normal(size=n).tolist(), strict=True)]
             shape = str(self._rng.choice(("box", "parallelotope", "zonotope")))
-            made = around(center, shape, widths, whole, self._rng)
+            made = around(center, shape, widths, own=whole, rng=self._rng)
             if made is not None:
                 sources.append(made)
         order = self._rng.permutation(m).tolist()

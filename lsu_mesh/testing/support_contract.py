@@ -162,7 +162,8 @@ class _Check:
         """Sets of other classes, x at the edge of each."""
         lower, upper = self._set.bounds()
         made = [
-            around(x, shape, np.maximum(upper - lower, 0.1 * self._scale), self._set, self._rng) for shape in SHAPES
+            around(x, shape, np.maximum(upper - lower, 0.1 * self._scale), own=self._set, rng=self._rng)
+            for shape in SHAPES
         ]
         return [one for one in made if one is not None]
 

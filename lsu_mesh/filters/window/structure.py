@@ -206,3 +206,22 @@ def _transform(model: LSUModel) -> tuple[Matrix, int]:
         raise ModelError(f"the columns of noise_map must be independent; it has shape {N.shape} and they are not")
     orthogonal = np.linalg.qr(N, mode="complete")[0][:, q:]
     return np.vstack([np.linalg.pinv(N), orthogonal.T]), q
+
+
+def domain_bounds(model: LSUModel) -> tuple[Vector, Vector]:
+    if model.domain is None:
+        return np.full(model.state_count, -np.inf), np.full(model.state_count, np.inf)
+    return model.domain.bounds()
+
+
+def input_matrix(model: LSUModel) -> Matrix:
+    return np.zeros((model.state_count, 0)) if model.B is None else model.B
+
+
+def are_equal(one: Matrix | None, other: Matrix | None) -> bool:
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
+
+
+def noise_widths(model: LSUModel, inverse: Matrix) -> Matrix:
+    """What brings the noise into the state, (n, q)."""
+    return inverse if model.noise_map is None else np.asarray(model.noise_map)

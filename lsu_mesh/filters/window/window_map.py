@@ -15,7 +15,15 @@ from lsu_mesh.filters.validation import checked_prior, input_interval, output_ve
 from lsu_mesh.filters.window.interval_estimate import interval_estimate
 from lsu_mesh.filters.window.program import HalfWidths, Selected, WindowData, WindowProgram, WindowSolution
 from lsu_mesh.filters.window.state import Window
-from lsu_mesh.filters.window.structure import Structure, UnknownEntries, check_window_model
+from lsu_mesh.filters.window.structure import (
+    Structure,
+    UnknownEntries,
+    are_equal,
+    check_window_model,
+    domain_bounds,
+    input_matrix,
+    noise_widths,
+)
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -247,21 +255,21 @@ class WindowMAP(Filter):
         check_window_model(used)
         if model is not None and any(entry.matrix in "AB" for entry in self._structure.entries):
             raise ModelError("a model of one step and unknown entries of A or B exclude each other")
-        if not _are_equal(used.noise_map, self._model.noise_map):
+        if not are_equal(used.noise_map, self._model.noise_map):
             raise ModelError("the model of a step must have the filter's noise map")
         return used
 
     def _grown(self, state: Window, used: LSUModel, center: Vector, spread: Vector) -> Window:
         data, theta = state.data, state.data.theta
         known = self._structure.known
-        own_A, own_B = (known["A"], known["B"]) if used is self._model else (used.A, _input_matrix(used))
+        own_A, own_B = (known["A"], known["B"]) if used is self._model else (used.A, input_matrix(used))
         A = own_A + self._structure.unknown_part("A", theta)
         B = own_B + self._structure.unknown_part("B", theta)
         inverse = np.linalg.inv(self._structure.at("E", theta)).astype(np.float64)
-        low, high = _domain(self._model)
+        low, high = domain_bounds(self._model)
         x = np.clip(inverse @ (A @ data.X[-1] + B @ center), low, high)
         none = np.full((1, x.size), np.nan)
-        noise = np.abs(_noise(self._model, inverse)) @ state.rho
+        noise = np.abs(noise_widths(self._model, inverse)) @ state.rho
         return Window(
             data=WindowData(
                 Y=np.vstack([data.Y, np.full((1, data.Y.shape[1]), np.nan)]),
@@ -330,7 +338,7 @@ class WindowMAP(Filter):
         lower, upper = checked_prior(self._model, support).bounds()
         n, m = self._model.state_count, self._model.output_count
         p, q = self._model.input_count, self._structure.noise_count
-        low, high = _met(lower, upper, *_domain(self._model))
+        low, high = _met(lower, upper, *domain_bounds(self._model))
         middle = np.where(np.isfinite(low) & np.isfinite(high), 0.5 * (low + high), np.clip(0.0, low, high))
         none = np.full((1, n), np.nan)
         self._state = Window(
@@ -362,25 +370,6 @@ class WindowMAP(Filter):
     def restore(self, snapshot: object) -> None:
         """Return to a state taken by :meth:`snapshot`, bit by bit."""
         self._state = cast("Window", snapshot)
-
-
-def _domain(model: LSUModel) -> tuple[Vector, Vector]:
-    if model.domain is None:
-        return np.full(model.state_count, -np.inf), np.full(model.state_count, np.inf)
-    return model.domain.bounds()
-
-
-def _input_matrix(model: LSUModel) -> Matrix:
-    return np.zeros((model.state_count, 0)) if model.B is None else model.B
-
-
-def _are_equal(one: Matrix | None, other: Matrix | None) -> bool:
-    return one is other or (one is not None and other is not None and np.array_equal(one, other))
-
-
-def _noise(model: LSUModel, inverse: Matrix) -> Matrix:
-    """What brings the noise into the state, (n, q)."""
-    return inverse if model.noise_map is None else np.asarray(model.noise_map)
 
 
 def _met(lower: Matrix, upper: Matrix, low: Matrix, high: Matrix) -> tuple[Matrix, Matrix]:

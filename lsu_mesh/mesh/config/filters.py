@@ -72,19 +72,19 @@ def read_filter(
     on_inconsistency = _read_inconsistency(table)
     reset_after = table.whole("reset_after", 5, low=1)
     adopt = _read_adopt(table, peers["identifier"], system)
-    options = _read_options(table, kind, sensors, chosen, system)
+    options = _read_options(table, kind, sensors, chosen=chosen, system=system)
     return FilterSettings(
-        name,
-        kind.name,
-        chosen,
-        deadline,
-        history,
-        transfer,
-        senders,
-        on_inconsistency,
-        reset_after,
-        options,
-        adopt,
+        name=name,
+        kind=kind.name,
+        sensors=chosen,
+        deadline=deadline,
+        history=history,
+        transfer=transfer,
+        transfer_from=senders,
+        on_inconsistency=on_inconsistency,
+        reset_after=reset_after,
+        options=options,
+        adopt=adopt,
     )
 
 

@@ -37,7 +37,15 @@ def read_fusion(
     max_constraints = table.whole("max_constraints", 12, low=0, high=500)
     table.finish()
     return FusionSettings(
-        name, sources, policy, faults, max_lag, deadline, quarantine_after, max_generators, max_constraints
+        name=name,
+        sources=sources,
+        policy=policy,
+        faults=faults,
+        max_lag=max_lag,
+        deadline=deadline,
+        quarantine_after=quarantine_after,
+        max_generators=max_generators,
+        max_constraints=max_constraints,
     )
 
 
@@ -52,7 +60,9 @@ def read_identifier(table: Table, name: str, sensors: Mapping[str, SensorSetting
         table.mismatch("margin", "at least 1", f"{margin:g}")
     lead = table.whole("lead", 20, low=1)
     table.finish()
-    return IdentifierSettings(name, chosen, learn, window, every, margin, lead)
+    return IdentifierSettings(
+        name=name, sensors=chosen, learn=learn, window=window, every=every, margin=margin, lead=lead
+    )
 
 
 def check_learning(
@@ -100,25 +110,32 @@ def _shared_sensors(file: str, settings: FusionSettings, filters: Mapping[str, F
             fed.setdefault(sensor, []).append(source)
     return [
         Problem(
-            file, f"fusion.{settings.name}", "faults",
-            f"is {settings.faults}, but sensor {sensor!r} feeds {len(sources)} sources ({', '.join(sources)}); if it "
-            "lies, all of them do",
-            f"a whole number ≥ {len(sources)}, or filters with sensors of their own",
-            str(settings.faults), is_warning=True,
+            file=file,
+            table=f"fusion.{settings.name}",
+            key="faults",
+            text=f"is {settings.faults}, but sensor {sensor!r} feeds {len(sources)} sources ({', '.join(sources)}); "
+            "if it lies, all of them do",
+            expected=f"a whole number ≥ {len(sources)}, or filters with sensors of their own",
+            found=str(settings.faults),
+            is_warning=True,
         )
         for sensor, sources in sorted(fed.items())
         if len(sources) > settings.faults
-    ]  # fmt: skip
+    ]
 
 
 def _transfers(file: str, settings: FusionSettings, filters: Mapping[str, FilterSettings]) -> list[Problem]:
     return [
         Problem(
-            file, f"fusion.{settings.name}", "sources",
-            f"source {source!r} takes transfers, so a liar may reach it; use transfer = \"off\", or the fused box of "
-            "this fusion",
-            'filters with transfer = "off" or "fused"', f'"{source}"', is_warning=True,
+            file=file,
+            table=f"fusion.{settings.name}",
+            key="sources",
+            text=f'source {source!r} takes transfers, so a liar may reach it; use transfer = "off", or the fused box '
+            "of this fusion",
+            expected='filters with transfer = "off" or "fused"',
+            found=f'"{source}"',
+            is_warning=True,
         )
         for source in settings.sources
         if source in filters and filters[source].transfer in ("predictor", "data-predictor")
-    ]  # fmt: skip
+    ]

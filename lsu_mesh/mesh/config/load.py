@@ -117,7 +117,7 @@ def _read_toml(path: Path, text: str) -> dict[str, Any]:
 
 
 def _unreadable(path: Path, text: str, expected: str, line: int | None = None) -> ConfigurationError:
-    return ConfigurationError([Problem(str(path), "", "", text, expected, line=line)])
+    return ConfigurationError([Problem(file=str(path), table="", key="", text=text, expected=expected, line=line)])
 
 
 def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configuration | None:
@@ -127,18 +127,19 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     model, prior, input_box = system.model, system.prior, system.input_box
     sensor_tables = _named(root, "sensors", problems)
     sensors = {n: read_sensor(t, n, system.state_count, path.parent) for n, t in sensor_tables.items()}
-    plant = read_plant(root.table("plant"), model, sensors, path.parent, problems)
+    plant = read_plant(root.table("plant"), model, sensors, folder=path.parent, problems=problems)
     filter_tables, fusion_tables = _named(root, "filters", problems), _named(root, "fusion", problems)
     identifier_tables = _named(root, "identifier", problems)
     kinds = {name: kind_of(table) for name, table in filter_tables.items()}
     sound = [name for name, kind in kinds.items() if kind.is_guaranteed]
     peers = {"filters": sound, "fusion": list(fusion_tables), "identifier": list(identifier_tables)}
     filters = {
-        name: read_filter(table, name, kinds[name], sensors, system, peers) for name, table in filter_tables.items()
+        name: read_filter(table, name, kinds[name], sensors=sensors, system=system, peers=peers)
+        for name, table in filter_tables.items()
     }
     fusion = {name: read_fusion(table, name, filters, peers) for name, table in fusion_tables.items()}
     identifiers = {name: read_identifier(table, name, sensors) for name, table in identifier_tables.items()}
-    check_learning(filters, fusion, identifiers, sound, problems)
+    check_learning(filters, fusion, identifiers, sound=sound, problems=problems)
     recorder, network = _read_recorder(root), read_network(root)
     supervisor = _read_supervisor(root)
     root.finish()
@@ -160,12 +161,29 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
             problems.add("model", "", "no model could be made", expected="A, rho and [model.prior]")
         return None
     return Configuration(
-        path, mesh, model, prior, input_box, plant, dict(sorted(sensors.items())), dict(sorted(filters.items())),
-        dict(sorted(fusion.items())), recorder, network, supervisor,
-        tuple(map(problems.placed, (*shared_sensor_warnings(problems.file, filters, fusion),
-                                    *open_endpoint_warnings(problems.file, network)))),
+        path=path,
+        mesh=mesh,
+        base_model=model,
+        prior=prior,
+        input_box=input_box,
+        plant=plant,
+        sensors=dict(sorted(sensors.items())),
+        filters=dict(sorted(filters.items())),
+        fusion=dict(sorted(fusion.items())),
+        recorder=recorder,
+        network=network,
+        supervisor=supervisor,
+        warnings=tuple(
+            map(
+                problems.placed,
+                (
+                    *shared_sensor_warnings(problems.file, filters, fusion),
+                    *open_endpoint_warnings(problems.file, network),
+                ),
+            )
+        ),
         identifiers=dict(sorted(identifiers.items())),
-    )  # fmt: skip
+    )
 
 
 def _read_mesh(root: Table) -> MeshSettings:
@@ -181,7 +199,7 @@ def _read_mesh(root: Table) -> MeshSettings:
     rate = table.number("rate", 1.0 / dt if isinstance(dt, float) else 1.0, above=0.0)
     start_time: float | None = table.read("start_time", NO_START, START_TIME)
     table.finish()
-    return MeshSettings(name, dt, steps, seed, rate, start_time)
+    return MeshSettings(name=name, dt=dt, steps=steps, seed=seed, rate=rate, start_time=start_time)
 
 
 def _spell_out_dates(values: dict[str, Any]) -> None:

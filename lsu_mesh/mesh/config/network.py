@@ -42,7 +42,7 @@ def read_network(root: Table) -> NetworkSettings:
         _check_endpoints(table, key, endpoints, tls.enabled)
     cache = table.whole("cache", None, low=1, high=10**6)
     table.finish()
-    return NetworkSettings(entry, listen, connect, cache, tls)
+    return NetworkSettings(entry=entry, listen=listen, connect=connect, cache=cache, tls=tls)
 
 
 def _check_endpoints(table: Table, key: str, endpoints: Iterable[str], encrypted: bool) -> None:
@@ -70,7 +70,14 @@ def _read_tls(network: Table) -> TlsSettings:
     access_control = table.flag("access_control", TlsSettings.access_control)
     verify_hosts = table.flag("verify_hosts", TlsSettings.verify_hosts)
     table.finish()
-    return TlsSettings(enabled, authority, certificate, key, access_control, verify_hosts)
+    return TlsSettings(
+        enabled=enabled,
+        authority=authority,
+        certificate=certificate,
+        key=key,
+        access_control=access_control,
+        verify_hosts=verify_hosts,
+    )
 
 
 def check_reserved(network: NetworkSettings, names: Sequence[tuple[str, str]], problems: Problems) -> None:
@@ -88,10 +95,15 @@ def open_endpoint_warnings(file: str, network: NetworkSettings) -> list[Problem]
     )
     return [
         Problem(
-            file, "network", key, f"{endpoint} {text}", "an endpoint with TLS, or of this host only", shown(endpoint),
+            file=file,
+            table="network",
+            key=key,
+            text=f"{endpoint} {text}",
+            expected="an endpoint with TLS, or of this host only",
+            found=shown(endpoint),
             is_warning=True,
         )
         for key, endpoints in (("entry", (network.entry,)), ("listen", network.listen))
         for endpoint in endpoints
         if is_open_to_others(endpoint) and (key == "listen" or ANYWHERE.search(endpoint))
-    ]  # fmt: skip
+    ]

@@ -103,7 +103,9 @@ class Problems:
 
     def add(self, table: str, key: str, text: str, *, expected: str = "", **more: Any) -> None:
         """Note a mistake; the line and the source are looked up."""
-        self.records.append(self.placed(Problem(self.file, table, key, text, expected or text, **more)))
+        self.records.append(
+            self.placed(Problem(file=self.file, table=table, key=key, text=text, expected=expected or text, **more))
+        )
 
     def placed(self, problem: Problem) -> Problem:
         """The same with its line, or with the flag or variable that the value came from."""

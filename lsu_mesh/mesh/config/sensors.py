@@ -80,7 +80,15 @@ def read_sensor(table: Table, name: str, states: int | None, folder: Path) -> Se
     if faults and source == "file":
         table.without("faults", "faults are simulated, a sensor that plays a file has none", "remove the key")
     table.finish()
-    return SensorSettings(name, tuple(map(tuple, rows)), tuple(widths), tuple(outputs), file, faults, simulated)
+    return SensorSettings(
+        name=name,
+        C=tuple(map(tuple, rows)),
+        r=tuple(widths),
+        outputs=tuple(outputs),
+        file=file,
+        faults=faults,
+        simulated_r=simulated,
+    )
 
 
 def _read_fault(table: Table) -> SensorFault:
@@ -133,4 +141,6 @@ def _data_problem(table: Table, path: Path, words: str) -> DataProblem:
     asked = re.search(r"expected (.+?), found (.+)$", text)
     expected, found = (asked[1], asked[2]) if asked else ("a CSV file with the columns that the table names", None)
     line = int(place[1]) if place else None
-    return DataProblem(str(path), table.path, "file", text, expected, found, line=line, words=words)
+    return DataProblem(
+        file=str(path), table=table.path, key="file", text=text, expected=expected, found=found, line=line, words=words
+    )

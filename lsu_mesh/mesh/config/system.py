@@ -43,13 +43,18 @@ def read_model(table: Table | None, problems: Problems) -> System:
     if not isinstance(A, list):
         return System(prior=prior, input_box=input_box)
     count = len(A)
-    _check_box("prior", prior, count, "state", problems)
+    _check_box("prior", prior, count, of="state", problems=problems)
     if isinstance(B, list) or "B" not in table.values:
-        _check_box("input_box", input_box, len(B[0]) if isinstance(B, list) else 0, "input", problems)
+        _check_box("input_box", input_box, len(B[0]) if isinstance(B, list) else 0, of="input", problems=problems)
     if not is_read:
         return System(None, prior, input_box, count)
     try:
-        return System(LSUModel(A, B, [], rho, [], noise_map, domain, **names), prior, input_box, count)
+        return System(
+            LSUModel(A=A, B=B, C=[], rho=rho, r=[], noise_map=noise_map, domain=domain, **names),
+            prior,
+            input_box,
+            count,
+        )
     except ModelError as error:
         for problem in error.problems:
             add_model_error(table, problem)

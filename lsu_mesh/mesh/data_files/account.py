@@ -52,7 +52,14 @@ def place(
     order = np.argsort(steps, kind="stable")
     sharing[order[1:]] = steps[order[1:]] == steps[order[:-1]]
     sharing &= inside
-    return Placement(steps, distance, before, after, sharing, inside & ~sharing if nearest else inside)
+    return Placement(
+        steps=steps,
+        distance_ns=distance,
+        is_before=before,
+        is_after=after,
+        is_sharing=sharing,
+        is_delivered=inside & ~sharing if nearest else inside,
+    )
 
 
 def _steps(data: DataFile, grid: Grid, *, nearest: bool, tolerance_ns: int) -> tuple[Integers, Integers]:

@@ -42,7 +42,7 @@ def split_rows(
     at = [layout.names.index(name) for name in names]
     found = _regular(text, layout, at, settings.comment)
     if found is None:
-        found = _irregular(text, layout, at, settings, problems, open_end)
+        found = _irregular(text, layout, at, settings=settings, problems=problems, open_end=open_end)
     columns, lines, blank = found
     return Cells(dict(zip(names, columns, strict=True)), lines, blank, open_end)
 

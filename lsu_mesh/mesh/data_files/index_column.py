@@ -31,10 +31,10 @@ def text_times(
     if len(cells) and IsoTimes(cells[:1]).is_time[0]:
         return _iso(cells, name, lines, problems)
     written = cells
-    decimals = Decimals(with_point(cells, name, lines, settings, problems))
-    _refuse(~decimals.is_number, written, name, lines, problems, "a time")
+    decimals = Decimals(with_point(cells, name, lines, settings=settings, problems=problems))
+    _refuse(~decimals.is_number, written, name, lines=lines, problems=problems, expected="a time")
     notes: list[str] = []
-    unit_ns = find_unit(decimals.about()[decimals.is_number], name, settings, problems, notes)
+    unit_ns = find_unit(decimals.about()[decimals.is_number], name, settings, problems=problems, notes=notes)
     if unit_ns is None:
         return Times(decimals.mantissa, decimals.places, 1, ())  # of a column that is refused
     ns, fits = decimals.in_ns(unit_ns)
@@ -47,7 +47,9 @@ def text_times(
 
 def _iso(cells: CellTexts, name: str, lines: Integers, problems: FileProblems) -> Times:
     times = IsoTimes(cells)
-    _refuse(~times.is_time, cells, name, lines, problems, "an ISO 8601 time of a day that exists")
+    _refuse(
+        ~times.is_time, cells, name, lines=lines, problems=problems, expected="an ISO 8601 time of a day that exists"
+    )
     zones = times.has_zone[times.is_time]
     if zones.any() and not zones.all():
         i = int(np.flatnonzero(times.is_time & (times.has_zone != times.has_zone[0]))[0])

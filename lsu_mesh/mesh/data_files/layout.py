@@ -74,8 +74,16 @@ def find_layout(data: bytes, settings: DataFileSettings, problems: FileProblems)
         for delimiter in delimiters:
             names = _cells(text, delimiter)
             if set(settings.wanted) <= set(names) and (settings.columns or len(names) > 1):
-                return _layout(data, (number, start, text), names, delimiter, lines, settings, problems)
-    raise _no_header(data, lines[0], delimiters, settings, problems)
+                return _layout(
+                    data,
+                    (number, start, text),
+                    names,
+                    delimiter=delimiter,
+                    lines=lines,
+                    settings=settings,
+                    problems=problems,
+                )
+    raise _no_header(data, lines[0], delimiters, settings=settings, problems=problems)
 
 
 def guess_names(data: bytes, settings: DataFileSettings, problems: FileProblems) -> tuple[str, ...]:
@@ -108,7 +116,13 @@ def _layout(
     if above:
         notes.append(f"the header is line {number}; {above} line{'s' if above > 1 else ''} above it skipped")
     end = data.find(b"\n", start)
-    return Layout(tuple(names), delimiter, number, len(data) if end < 0 else end + 1, tuple(notes))
+    return Layout(
+        names=tuple(names),
+        delimiter=delimiter,
+        header_line=number,
+        body=len(data) if end < 0 else end + 1,
+        notes=tuple(notes),
+    )
 
 
 def _head_lines(data: bytes, comment: str) -> list[tuple[int, int, str]]:

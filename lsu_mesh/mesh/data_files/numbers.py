@@ -69,10 +69,10 @@ def read_numbers(
 ) -> Vector:
     """(T,) float64, NaN = missing; every decimal is rounded to the nearest double."""
     missing, written = missing_cells(cells, settings), cells
-    cells = with_point(cells, name, lines, settings, problems)
+    cells = with_point(cells, name, lines, settings=settings, problems=problems)
     values, wrong = _converted(cells, ~missing)
     if wrong.any():
-        _record_texts(written, name, lines, wrong, settings, problems)
+        _record_texts(written, name, lines, wrong=wrong, settings=settings, problems=problems)
     infinite = np.isinf(values)
     if infinite.any():
         i = int(np.argmax(infinite))
@@ -148,7 +148,7 @@ def read_steps(
     cells: CellTexts, name: str, lines: Integers, settings: DataFileSettings, problems: FileProblems
 ) -> Integers:
     """(T,) whole numbers; 12.0 is one."""
-    cells = with_point(cells, name, lines, settings, problems)
+    cells = with_point(cells, name, lines, settings=settings, problems=problems)
     values, _ = _converted(cells, np.ones(len(cells), dtype=bool))
     with np.errstate(invalid="ignore"):
         whole = (values == np.floor(values)) & (np.abs(values) <= MAX_STEP)

@@ -39,7 +39,7 @@ def look(settings: DataFileSettings, count: int | None = None) -> tuple[str, ...
         names, place = layout.names, f"line {layout.header_line}"
     else:
         names = _typed_file(settings, kind, problems).names
-    return _value_columns(names, settings, count, place, problems)
+    return _value_columns(names, settings, count, place=place, problems=problems)
 
 
 def columns_of(path: Path) -> tuple[str, ...]:
@@ -85,17 +85,22 @@ def _value_columns(
 def _read_text(settings: DataFileSettings, count: int | None, problems: FileProblems) -> DataFile:
     data = check_text(read_bytes(settings.path, settings.max_bytes + 1, problems), problems, whole=True)
     layout = find_layout(data, settings, problems)
-    values = _value_columns(layout.names, settings, count, f"line {layout.header_line}", problems)
-    cells = split_rows(data, layout, tuple(dict.fromkeys((settings.index, *values))), settings, problems)
+    values = _value_columns(layout.names, settings, count, place=f"line {layout.header_line}", problems=problems)
+    cells = split_rows(
+        data, layout, tuple(dict.fromkeys((settings.index, *values))), settings=settings, problems=problems
+    )
     check_last_line(cells, layout, settings.decimal, problems)
     index = cells.columns[settings.index]
     times = steps = None
     if settings.indexed_by == "time":
-        times = text_times(index, settings.index, cells.lines, settings, problems)
+        times = text_times(index, settings.index, cells.lines, settings=settings, problems=problems)
     else:
-        steps = read_steps(index, settings.index, cells.lines, settings, problems)
-    columns = {name: read_numbers(cells.columns[name], name, cells.lines, settings, problems) for name in values}
-    return _ordered(settings, columns, cells.lines, times, steps, cells.blank, layout.notes)
+        steps = read_steps(index, settings.index, cells.lines, settings=settings, problems=problems)
+    columns = {
+        name: read_numbers(cells.columns[name], name, cells.lines, settings=settings, problems=problems)
+        for name in values
+    }
+    return _ordered(settings, columns, cells.lines, times=times, steps=steps, blank=cells.blank, notes=layout.notes)
 
 
 def _typed_file(settings: DataFileSettings, kind: FileKind, problems: FileProblems) -> NumpyFile | ParquetFile:
@@ -106,7 +111,7 @@ def _typed_file(settings: DataFileSettings, kind: FileKind, problems: FileProble
 
 def _read_typed(settings: DataFileSettings, kind: FileKind, count: int | None, problems: FileProblems) -> DataFile:
     file = _typed_file(settings, kind, problems)
-    values = _value_columns(file.names, settings, count, "", problems)
+    values = _value_columns(file.names, settings, count, place="", problems=problems)
     index, *columns = file.read(tuple(dict.fromkeys((settings.index, *values))))
     times = steps = None
     if settings.indexed_by == "time":
@@ -117,7 +122,9 @@ def _read_typed(settings: DataFileSettings, kind: FileKind, count: int | None, p
     if settings.index in values:
         by_name[settings.index] = typed_numbers(index, settings, problems)
     rows = np.arange(1, len(index.data) + 1, dtype=np.int64)
-    return _ordered(settings, {name: by_name[name] for name in values}, rows, times, steps, 0, ())
+    return _ordered(
+        settings, {name: by_name[name] for name in values}, rows, times=times, steps=steps, blank=0, notes=()
+    )
 
 
 def _ordered(
@@ -132,14 +139,14 @@ def _ordered(
     order = np.argsort(index, kind="stable") if out_of_order else slice(None)
     half = np.zeros(len(lines), dtype=np.int64) if times is None else times.half_ns[order]
     return DataFile(
-        settings.path,
-        {name: values[order] for name, values in columns.items()},
-        lines[order],
-        None if times is None else times.ns[order],
-        half,
-        1 if times is None else times.digit_ns,
-        None if steps is None else steps[order],
-        out_of_order,
-        blank,
-        (*notes, *(times.notes if times is not None else ())),
+        path=settings.path,
+        columns={name: values[order] for name, values in columns.items()},
+        lines=lines[order],
+        time_ns=None if times is None else times.ns[order],
+        time_half_ns=half,
+        digit_ns=1 if times is None else times.digit_ns,
+        steps=None if steps is None else steps[order],
+        out_of_order=out_of_order,
+        blank=blank,
+        notes=(*notes, *(times.notes if times is not None else ())),
     )

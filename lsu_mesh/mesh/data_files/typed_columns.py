@@ -37,7 +37,7 @@ def typed_numbers(column: TypedColumn, settings: DataFileSettings, problems: Fil
     lines = np.arange(1, len(column.data) + 1, dtype=np.int64)
     if column.is_text:
         cells: CellTexts = np.where(column.missing, b"", column.data.astype(np.bytes_))
-        return read_numbers(cells, column.name, lines, settings, problems)
+        return read_numbers(cells, column.name, lines, settings=settings, problems=problems)
     if column.unit_ns is not None:
         problems.add(f"time {column.name}", f"column {column.name!r}", "holds times; expected numbers")
     values = np.where(column.missing, np.nan, column.data.astype(np.float64))
@@ -49,7 +49,7 @@ def typed_steps(column: TypedColumn, settings: DataFileSettings, problems: FileP
     """(T,)."""
     if column.is_text:
         lines = np.arange(1, len(column.data) + 1, dtype=np.int64)
-        return read_steps(column.data.astype(np.bytes_), column.name, lines, settings, problems)
+        return read_steps(column.data.astype(np.bytes_), column.name, lines, settings=settings, problems=problems)
     values = column.data.astype(np.float64)
     with np.errstate(invalid="ignore"):
         whole = (values == np.floor(values)) & (np.abs(values) <= MAX_STEP) & ~column.missing
@@ -62,7 +62,7 @@ def typed_times(column: TypedColumn, settings: DataFileSettings, problems: FileP
     count = len(column.data)
     if column.is_text:
         lines = np.arange(1, count + 1, dtype=np.int64)
-        return text_times(column.data.astype(np.bytes_), column.name, lines, settings, problems)
+        return text_times(column.data.astype(np.bytes_), column.name, lines, settings=settings, problems=problems)
     is_float = column.data.dtype.kind == "f"
     bad = column.missing | (~np.isfinite(column.data.astype(np.float64)) if is_float else False)
     _refuse(bad, column, problems, "is no time; every row needs one")
@@ -71,7 +71,7 @@ def typed_times(column: TypedColumn, settings: DataFileSettings, problems: FileP
     unit_ns = column.unit_ns
     if unit_ns is None:
         about = data[~bad].astype(np.float64)
-        unit_ns = find_unit(about, column.name, settings, problems, notes)
+        unit_ns = find_unit(about, column.name, settings, problems=problems, notes=notes)
     if unit_ns is None:
         return Times(np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64), 1, ())  # it is refused
     far = np.abs(data.astype(np.float64)) * unit_ns >= MAX_TIME_NS

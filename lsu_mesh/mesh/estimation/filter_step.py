@@ -132,7 +132,14 @@ def _contradicted(engine: Filter, y: Vector, found: FilterOutcome, rule: Rule) -
         case "widen":
             factor = widen(engine, y)
             if factor is not None:
-                return FilterOutcome("ok", found.transfers, found.gain, found.rejected, factor, found.error)
+                return FilterOutcome(
+                    status="ok",
+                    transfers=found.transfers,
+                    gain=found.gain,
+                    rejected=found.rejected,
+                    factor=factor,
+                    error=found.error,
+                )
         case "drop":
             pass
         case _:

@@ -96,7 +96,7 @@ def fusion_step(
     elif policy.is_intersection:
         outcome = _one_by_one(meeting, sources, has_prediction)
     else:
-        outcome = _together(meeting, sources, policy, faults, has_prediction)
+        outcome = _together(meeting, sources, policy, faults=faults, has_prediction=has_prediction)
     engine.resume(engine.support, *outcome.bounds)
     return outcome
 

@@ -151,7 +151,14 @@ class HeldSet:
     def snapshot(self) -> Held:
         """All of it, for :meth:`restore`."""
         descent = self.epochs.snapshot()
-        return Held(self.engine.snapshot(), self.reach.snapshot(), self.base, self.used, self.guarantee, descent)
+        return Held(
+            engine=self.engine.snapshot(),
+            reach=self.reach.snapshot(),
+            base=self.base,
+            used=self.used,
+            guarantee=self.guarantee,
+            descent=descent,
+        )
 
     def restore(self, held: Held) -> None:
         """Hold an earlier set of the same epoch again; the set then descends from what it did."""

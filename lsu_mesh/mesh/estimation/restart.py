@@ -63,7 +63,7 @@ class RestartSearch:
         """
         before = engine.snapshot()
         newest_first = sorted(self._fused.values(), key=lambda fused: -fused.step)
-        carried_on = (self._carried(engine, fused, k, inputs, abandons) for fused in newest_first)
+        carried_on = (self._carried(engine, fused, k, inputs=inputs, abandons=abandons) for fused in newest_first)
         starts = [start for start in carried_on if start is not None]
         box, domain = reach.box, engine.model.domain
         if box is not None:
@@ -103,7 +103,13 @@ class RestartSearch:
             except (InconsistentData, UnboundedSupport):
                 return None
             used += [] if u is None else [u.reference]
-        return Start(engine.snapshot(), fused.reference, f"the fused set of step {fused.step}", used, fused)
+        return Start(
+            set=engine.snapshot(),
+            base=fused.reference,
+            words=f"the fused set of step {fused.step}",
+            used=used,
+            message=fused,
+        )
 
 
 def _holding(engine: Filter, support: Orthotope) -> object:

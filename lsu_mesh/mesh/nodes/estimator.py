@@ -131,7 +131,7 @@ class Estimator(Node):
         elif step.input.u != message.u:
             about: About = {"source": message.src, "step": message.step}
             text = f"input of step {message.step} came again from {message.src} with another value; the first counts"
-            return [self.event("WARN", "input-changed", text, now, message.step, about)]
+            return [self.event("WARN", "input-changed", text, now=now, step=message.step, about=about)]
         return []
 
     def take_candidate(self, message: Posterior) -> None:
@@ -228,7 +228,7 @@ class Estimator(Node):
             return None
         step.revision += 1
         combined = replace(combined, used=held.used)
-        posterior = step.published = self.posterior(k, step, combined, support, now)
+        posterior = step.published = self.posterior(k, step, combined, support=support, now=now)
         held.record_published(posterior)
         if posterior.status != "inconsistent":
             self.last_posterior = posterior
@@ -263,7 +263,7 @@ class Estimator(Node):
                 self._start_over(k, words, now)
                 return False
             about: About = {"step": k, "epoch": self.held.epochs.number}
-            self._remarks.append(self.event("ERROR", "reset", words, now, k, about))
+            self._remarks.append(self.event("ERROR", "reset", words, now=now, step=k, about=about))
         return True
 
     def _take_remarks(self) -> list[Message]:
@@ -334,7 +334,7 @@ class Estimator(Node):
         self.join_again(k + 1, now)
         self._counts["resets"] += 1
         text = f"{why}; starting again behind it"
-        self._remarks.append(self.event("ERROR", "started-over", text, now, k, {"step": k}))
+        self._remarks.append(self.event("ERROR", "started-over", text, now=now, step=k, about={"step": k}))
 
     def join_again(self, first: int, since: int) -> None:
         """Forget what is before a step and start from there, as a peer that has listened since then."""

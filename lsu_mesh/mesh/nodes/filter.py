@@ -48,7 +48,13 @@ class FilterNode(Estimator):
         settings = configuration.filters[name]
         self.settings = settings
         model = configuration.model(settings.sensors)
-        super().__init__(configuration, name, boot, make_engine(settings, model, configuration.prior), settings.sensors)
+        super().__init__(
+            configuration,
+            name,
+            boot,
+            engine=make_engine(settings, model, configuration.prior),
+            sources=settings.sensors,
+        )
         self._sensor_of_row = [sensor for sensor in settings.sensors for _ in configuration.sensors[sensor].C]
         self._inconsistent: set[int] = set()
         """Steps in a row, up to the current one, whose data contradicted the set."""
@@ -113,7 +119,7 @@ class FilterNode(Estimator):
         elif isinstance(first, Measurement) and first.y != message.y:
             text = f"{message.name} sent step {message.step} again with another value; the first counts"
             about: About = {"sensor": message.name, "step": message.step}
-            return [self.event("WARN", "measurement-changed", text, now, message.step, about)]
+            return [self.event("WARN", "measurement-changed", text, now=now, step=message.step, about=about)]
         return []
 
     # -- one step
@@ -128,17 +134,28 @@ class FilterNode(Estimator):
         origin = min((message.origin_ns for message in used), default=None)
         messages = [*adopted, *self._repair(k, y, now)]
         if self.held.unsound:
-            return Combined("inconsistent", [], missing, origin, self.held.unsound), messages
+            return Combined(
+                status="inconsistent", used=[], missing=missing, origin=origin, cause=self.held.unsound
+            ), messages
         outcome, told = self._update(k, step, y, now)
         messages += told
         if self.held.unsound:  # the data are not in the set: it is the one from before, of which nothing is believed
-            return Combined("inconsistent", [], missing, origin, str(outcome.error)), messages
+            return Combined(
+                status="inconsistent", used=[], missing=missing, origin=origin, cause=str(outcome.error)
+            ), messages
         for message in outcome.transfers:
             self.held.add_dependency(message)
             if self._transfer.way == "data-predictor":
                 self.held.downgrade_guarantee("none")
         references = [message.reference for message in (*outcome.transfers, *used)]
-        return Combined(outcome.status, references, missing, origin, self._cause(outcome), outcome.gain), messages
+        return Combined(
+            status=outcome.status,
+            used=references,
+            missing=missing,
+            origin=origin,
+            cause=self._cause(outcome),
+            gain=outcome.gain,
+        ), messages
 
     def _adopt(self, k: int, now: int) -> list[Message]:
         """Go by announced bounds from their step on: from the domain, in a new epoch, and never better than learned."""
@@ -154,7 +171,7 @@ class FilterNode(Estimator):
         self.start_from("domain", (message.reference,))
         text = f"step {k}: adopted the bounds that {message.src} found; started again from the domain"
         about: About = {"step": k, "epoch": self.held.epochs.number, "source": message.src, "factor": message.factor}
-        return [self.event("WARN", "bounds-adopted", text, now, k, about)]
+        return [self.event("WARN", "bounds-adopted", text, now=now, step=k, about=about)]
 
     def _measured(self, step: Step) -> dict[str, Measurement]:
         """What the sensors have sent of a step, in the order of their names."""
@@ -169,8 +186,8 @@ class FilterNode(Estimator):
             self.engine,
             y,
             self._transfers(k, step, inputs),
-            lambda message: self._transfer.as_set(message, k, self.engine, inputs),
-            contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse",
+            as_set=lambda message: self._transfer.as_set(message, k, self.engine, inputs),
+            rule=contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse",
         )
         # a transfer that misses the set was told of when the step was first done
         rejected = [one for one in outcome.rejected if one.by_data or not is_replay]
@@ -207,7 +224,7 @@ class FilterNode(Estimator):
         self._counts["transfers rejected"] += 1
         source = rejected.message.src
         text = f"step {k}: the transfer from {source} was left out: {rejected.reason}"
-        return self.event("WARN", "transfer-rejected", text, now, k, {"source": source, "step": k})
+        return self.event("WARN", "transfer-rejected", text, now=now, step=k, about={"source": source, "step": k})
 
     @staticmethod
     def _cause(outcome: FilterOutcome) -> str | None:
@@ -224,12 +241,14 @@ class FilterNode(Estimator):
 
     def _widened_event(self, k: int, error: InconsistentData, now: int) -> Message:
         text = f"step {k}: {error}; r was widened by {self._factor:.4g} in this step, the set is no longer guaranteed"
-        return self.event("WARN", "widened", text, now, k, {"step": k, "factor": self._factor})
+        return self.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": self._factor})
 
     def _drop(self, k: int, y: Vector, dropped: Dropped, now: int) -> list[Message]:
         """Tell what was left out because it contradicts the prediction; reset when it goes on."""
         self._inconsistent.add(k)
-        messages = [self._dropped_event(k, row, y, dropped, now) for row in (*dropped.alone, *dropped.together)]
+        messages = [
+            self._dropped_event(k, row, y, dropped=dropped, now=now) for row in (*dropped.alone, *dropped.together)
+        ]
         if self.settings.on_inconsistency == "reset" and len(self._inconsistent) >= self.settings.reset_after:
             messages.append(self._reset(k, y, now))
         return messages
@@ -247,7 +266,7 @@ class FilterNode(Estimator):
             "sensor": sensor, "output": output, "step": k, "y": float(y[row]), "lower": lower, "upper": upper,
             "gap": gap if is_alone else None,
         }  # fmt: skip
-        return self.event("WARN", "contradiction", text, now, k, about)
+        return self.event("WARN", "contradiction", text, now=now, step=k, about=about)
 
     def _reset(self, k: int, y: Vector, now: int) -> Message:
         """Too many contradictions in a row: start again from something sound, or say that there is nothing."""
@@ -259,17 +278,19 @@ class FilterNode(Estimator):
             self._hold(start)
             self.engine.update(y)
             text = f"step {k}: {count} steps in a row contradicted the set; started again from {start.words}"
-            return self.event("ERROR", "reset", text, now, k, {"step": k, "epoch": self.held.epochs.number})
+            return self.event(
+                "ERROR", "reset", text, now=now, step=k, about={"step": k, "epoch": self.held.epochs.number}
+            )
         text = (
             f"step {k}: {count} steps in a row contradicted the set and there is nothing sound to "
             "start again from; give the model a domain, or check the declared bounds"
         )
-        return self.event("ERROR", "reset-impossible", text, now, k, {"step": k})
+        return self.event("ERROR", "reset-impossible", text, now=now, step=k, about={"step": k})
 
     def _refuse_start(self, k: int, y: Vector, error: InconsistentData, now: int) -> list[Message]:
         """The set that the node started from misses the first data: it was not sound."""
         self._is_tested = True
-        event = self._abandon(k, y, f"the set that it started from contradicts the data: {error}", {}, now)
+        event = self._abandon(k, y, f"the set that it started from contradicts the data: {error}", about={}, now=now)
         if not self.held.unsound:
             self.engine.update(y)
         return [event]
@@ -278,13 +299,17 @@ class FilterNode(Estimator):
         """Leave an epoch that a source has abandoned; where there was nothing sound to start from, look again."""
         source = self.held.epochs.abandoned
         if source is not None:
-            return [self._abandon(k, y, f"{source} has abandoned its epoch", {"source": source}, now)]
+            return [self._abandon(k, y, f"{source} has abandoned its epoch", about={"source": source}, now=now)]
         start = self._start_again(k, y, abandons=False) if self.held.unsound else None
         if start is None:
             return []
         self._hold(start)
         text = f"step {k}: started again from {start.words}"
-        return [self.event("INFO", "found-start", text, now, k, {"step": k, "epoch": self.held.epochs.number})]
+        return [
+            self.event(
+                "INFO", "found-start", text, now=now, step=k, about={"step": k, "epoch": self.held.epochs.number}
+            )
+        ]
 
     def _abandon(self, k: int, y: Vector, why: str, about: About, now: int) -> Message:
         """A new epoch at once, so that others learn of it; held is something sound, or nothing that may be believed."""
@@ -292,10 +317,10 @@ class FilterNode(Estimator):
         self.abandon_epoch(f"{why}; there is nothing sound to start again from")
         about = about | {"step": k, "epoch": self.held.epochs.number}
         if start is None:
-            return self.event("ERROR", "epoch-lost", f"step {k}: {self.held.unsound}", now, k, about)
+            return self.event("ERROR", "epoch-lost", f"step {k}: {self.held.unsound}", now=now, step=k, about=about)
         self._hold(start)
         text = f"step {k}: {why}; started again from {start.words}"
-        return self.event("WARN", "epoch-left", text, now, k, about)
+        return self.event("WARN", "epoch-left", text, now=now, step=k, about=about)
 
     def _hold(self, start: Start) -> None:
         self.engine.restore(start.set)
@@ -306,7 +331,7 @@ class FilterNode(Estimator):
     def _start_again(self, k: int, y: Vector, *, abandons: bool) -> Start | None:
         """A set of step k, before its data, that is sound and meets them; ``None`` where there is none."""
         inputs = self.timeline.inputs
-        return self._restart_search.find(self.engine, k, y, self.held.reach, inputs, abandons=abandons)
+        return self._restart_search.find(self.engine, k, y, reach=self.held.reach, inputs=inputs, abandons=abandons)
 
     def _start_from_candidate(self) -> bool:
         if not super()._start_from_candidate():

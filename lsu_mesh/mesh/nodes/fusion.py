@@ -48,7 +48,7 @@ class FusionNode(Estimator):
         self.settings = configuration.fusion[name]
         self._policy = POLICIES[self.settings.policy]
         engine = fusion_engine(configuration, self.settings)
-        super().__init__(configuration, name, boot, engine, self.settings.sources)
+        super().__init__(configuration, name, boot, engine=engine, sources=self.settings.sources)
         self._rejected: list[Rejection] = []
         self._quarantine = Quarantine(self.sources, self.settings.quarantine_after, self.settings.max_lag)
         self._reported: set[tuple[int, str]] = set()
@@ -106,7 +106,7 @@ class FusionNode(Estimator):
         self.join_again(first, now - START_GRACE)
         self._counts["skipped"] += skipped
         text = f"too far behind: {skipped} steps from step {k} on are skipped; going on from what the sources say"
-        return [self.event("WARN", "skipped-ahead", text, now, k, {"step": k, "skipped": skipped})]
+        return [self.event("WARN", "skipped-ahead", text, now=now, step=k, about={"step": k, "skipped": skipped})]
 
     def _sense_silence(self, now: int) -> None:
         """When nothing at all has come for a while, steps go on by the clock; the set then grows, honestly."""
@@ -144,7 +144,7 @@ class FusionNode(Estimator):
         self._add_dependencies(outcome.used)
         origin = min((source.message.origin_ns for source in outcome.used), default=None)
         used = [source.message.reference for source in outcome.used]
-        return Combined(status, used, missing, origin, cause), messages
+        return Combined(status=status, used=used, missing=missing, origin=origin, cause=cause), messages
 
     def _passes_over(self) -> bool:
         """Far behind, a step is only predicted through: nobody is told of it, and later sources know what it knew."""
@@ -179,7 +179,11 @@ class FusionNode(Estimator):
             return "inconsistent", f"{CONTRADICTION}, and {self.held.unsound}", []
         cause = f"more than {self.settings.faults} of the sources contradict one another"
         about: About = {"step": k, "faults": self.settings.faults}
-        return "inconsistent", cause, [self.event("ERROR", "too-many-faults", f"step {k}: {cause}", now, k, about)]
+        return (
+            "inconsistent",
+            cause,
+            [self.event("ERROR", "too-many-faults", f"step {k}: {cause}", now=now, step=k, about=about)],
+        )
 
     def _add_dependencies(self, used: Sequence[Source]) -> None:
         """No single source carries a relaxed set: of those that are learned, or abandoned, ``faults`` may be wrong."""
@@ -224,7 +228,7 @@ class FusionNode(Estimator):
 
     def _dropped_event(self, k: int, cause: str, now: int) -> Message:
         about: About = {"step": k, "epoch": self.held.epochs.number}
-        return self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now, k, about)
+        return self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now=now, step=k, about=about)
 
     def _start_from_candidate(self) -> bool:
         """A fusion that starts late takes what its sources say together of a step, once enough of them are there."""
@@ -251,7 +255,9 @@ class FusionNode(Estimator):
             self._reported.add((k, name))
             self._counts["contradictions"] += 1
             text = f"step {k}: {name} {OUTVOTED}; left out"
-            messages.append(self.event("WARN", "source-rejected", text, now, k, {"source": name, "step": k}))
+            messages.append(
+                self.event("WARN", "source-rejected", text, now=now, step=k, about={"source": name, "step": k})
+            )
         return messages
 
     def _record_rejected(self, k: int, agreeing: Sequence[Source], now: int) -> list[Message]:
@@ -265,9 +271,9 @@ class FusionNode(Estimator):
             count = self.settings.quarantine_after
             if is_in:
                 text = f"step {k}: {name} was left out {count} times and is quarantined"
-                return self.event("ERROR", "quarantined", text, now, k, {"source": name, "step": k})
+                return self.event("ERROR", "quarantined", text, now=now, step=k, about={"source": name, "step": k})
             text = f"step {k}: {name} has agreed {count} times in a row and is let back in"
-            return self.event("INFO", "let-back-in", text, now, k, {"source": name, "step": k})
+            return self.event("INFO", "let-back-in", text, now=now, step=k, about={"source": name, "step": k})
 
         return say
 

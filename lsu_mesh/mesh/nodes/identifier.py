@@ -106,13 +106,17 @@ class IdentifierNode(Node):
             factor = smallest(Structure(self._model), record, learn, self._box(first)).objective
         except InconsistentData as error:
             text = f"steps {first} to {last}: no {learn} explains the data: {error}"
-            return [self.event("ERROR", "nothing-explains", text, now, last, {"first": first, "last": last})]
+            return [
+                self.event("ERROR", "nothing-explains", text, now=now, step=last, about={"first": first, "last": last})
+            ]
         except LsuMeshError as error:
             self._counts["unsolved"] += 1
-            return [self.event("WARN", "not-looked-at", f"steps {first} to {last}: {error}", now, last, {})]
+            return [
+                self.event("WARN", "not-looked-at", f"steps {first} to {last}: {error}", now=now, step=last, about={})
+            ]
         self._counts["factor"] = factor
         explained = factor <= 1.0 + ROUNDING
-        suggestion = self._suggestion(factor, explained, first, last, now)
+        suggestion = self._suggestion(factor, explained, first, last=last, now=now)
         told = self._reported(factor, explained, suggestion, now)
         if not explained:
             self._counts["suggestions"] += 1
@@ -153,10 +157,10 @@ class IdentifierNode(Node):
                 f"{factor:.4g} times as large; from step {suggestion.adopt_at} on {self.settings.margin:g} times that"
             )
             about["adopt_at"] = suggestion.adopt_at
-            return [self.event("WARN", "bounds-do-not-explain", text, now, last, about)]
+            return [self.event("WARN", "bounds-do-not-explain", text, now=now, step=last, about=about)]
         if not self._explained:
             text = f"the bounds explain the data of steps {first} to {last}: {factor:.4g} of them would do"
-            return [self.event("INFO", "bounds-explain", text, now, last, about)]
+            return [self.event("INFO", "bounds-explain", text, now=now, step=last, about=about)]
         return []
 
     def step(self) -> int:

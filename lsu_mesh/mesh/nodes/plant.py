@@ -118,7 +118,7 @@ class PlantNode(Node):
             u = self._file.get(k)
             return np.zeros(self._model.input_count) if u is None or np.isnan(u).any() else u
         size = self._model.input_count
-        return input_at(self._settings.inputs, self.configuration.mesh.seed, k, size, f"{self.name}/input")
+        return input_at(self._settings.inputs, self.configuration.mesh.seed, k, size=size, name=f"{self.name}/input")
 
     def wakeup(self) -> int | None:
         due = None if self.finished else self._schedule.time_of(self._next)

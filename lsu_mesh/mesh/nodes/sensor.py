@@ -125,7 +125,7 @@ class FileSensorNode(Node):
                 "a smaller dt keeps them"
             )
             about: dict[str, str | int | float | None] = {"sensor": self.name, "rows": self._played.collisions}
-            messages.append(self.event("WARN", "rows-share-a-step", text, now, self._next, about))
+            messages.append(self.event("WARN", "rows-share-a-step", text, now=now, step=self._next, about=about))
         due = min(self._schedule.due(now), self._last)
         if not self._has_begun and due:
             self._has_begun = True

@@ -69,7 +69,9 @@ class Containment:
         elif reason:
             self.excused[reason] += 1
         else:
-            self.misses.append(Miss(message.src, message.topic, message.step, message.seq, outside))
+            self.misses.append(
+                Miss(peer=message.src, topic=message.topic, step=message.step, seq=message.seq, state=outside)
+            )
 
     def _outside(self, message: Posterior | Prediction, x: list[float]) -> str:
         """Words that say how the truth is outside of a set; "" where it is not."""

@@ -265,7 +265,9 @@ class FilterRecomputation(Recomputation):
             raise DoesNotFit("used", f"sensors {', '.join(foreign)}", f"those of {self._settings.name}")
         y = stack(self._configuration, self._settings.sensors, given)
         rule = contradiction_rule(self._settings.on_inconsistency)
-        outcome = filter_step(self._engine, y, brought.transfers, lambda message: self._as_set(message, k), rule)
+        outcome = filter_step(
+            self._engine, y, brought.transfers, as_set=lambda message: self._as_set(message, k), rule=rule
+        )
         if outcome.rejected:
             one = outcome.rejected[0]
             raise DoesNotFit("used", f"the {one.message.topic} of {one.message.src}", f"it left out: {one.reason}")

@@ -74,7 +74,15 @@ def missing_files(configuration: Configuration) -> list[Problem]:
 
 def _missing(configuration: Configuration, key: str, found: str, text: str) -> Problem:
     file = str(configuration.path)
-    return Problem(file, "network.tls", key, text, "a file on this host", f'"{found}"', is_warning=True)
+    return Problem(
+        file=file,
+        table="network.tls",
+        key=key,
+        text=text,
+        expected="a file on this host",
+        found=f'"{found}"',
+        is_warning=True,
+    )
 
 
 def certificate_file(configuration: Configuration, text: str, name: str) -> Path:

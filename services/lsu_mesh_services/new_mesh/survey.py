@@ -63,9 +63,18 @@ def survey(path: Path, time: str | None, step: str | None, columns: Sequence[str
     values, seconds = list(data.columns.values()), _seconds(data, dt)
     rates = [_rates(y, seconds, float(dt)) for y in values]
     return Survey(
-        path, index, indexed_by, tuple(data.columns), start_ns, dt, tuple(_resolution(y) for y in values),
-        tuple(_first(y) for y in values), tuple(a for a, _ in rates), tuple(b for _, b in rates), left_out,
-    )  # fmt: skip
+        path=path,
+        index=index,
+        indexed_by=indexed_by,
+        columns=tuple(data.columns),
+        start_ns=start_ns,
+        dt=dt,
+        resolution=tuple(_resolution(y) for y in values),
+        first=tuple(_first(y) for y in values),
+        largest_speed=tuple(a for a, _ in rates),
+        largest_acceleration=tuple(b for _, b in rates),
+        left_out=left_out,
+    )
 
 
 def _index(path: Path, names: Sequence[str], time: str | None, step: str | None) -> tuple[str, str]:
