@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import math
 import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from lsu_mesh.array_types import Matrix
+from lsu_mesh.filters.grid import OffGrid
 from lsu_mesh.mesh.config.problem import Problem
+from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
 from lsu_mesh.mesh.data_files.settings import DataFileSettings
-from lsu_mesh.model import LSUModel
+from lsu_mesh.mesh.grid import Grid
+from lsu_mesh.model import ContinuousModel, LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
 TransferWay = Literal["off", "predictor", "fused", "data-predictor"]
@@ -40,6 +45,10 @@ class MeshSettings:
     seed: int
     rate: float
     start_time: float | None
+    exact_dt: Fraction | None = None
+    """``dt`` exactly as it is written, in seconds; ``None``: the decimal of ``dt``."""
+    start_ns: int | None = None
+    """t_0 in nanoseconds since 1970, exactly as ``start_time`` is written."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +87,26 @@ class SensorSettings:
     faults: tuple[SensorFault, ...]
     simulated_r: tuple[float, ...] = ()
     """Half-widths of the simulated noise, where they are not r."""
+    D: tuple[tuple[float, ...], ...] = ()
+    """Rows of the feedthrough, one per row of C; empty: none."""
+    offset: tuple[float, ...] = ()
+    """d of ``y = C x + D u + d + v``; empty: 0."""
+    period: tuple[float, ...] = ()
+    """Periods of the outputs (360, 2π), 0 where an output has none; empty: none has."""
+    time_error_ns: int = 0
+    """Half-width of what is not known of the times of its measurements."""
+    rate: tuple[float, ...] = ()
+    """Bound of the noise-free outputs' |dy/dt|, by which a discrete model may use data off the grid; empty: none."""
+    off_grid: OffGrid = "refuse"
+    """What a discrete model does with data off the grid and without ``rate``."""
+    tolerance_ns: int | None = None
+    """So far from t_k a datum is of step k by declaration; ``None``: half a unit of the last digit of its times."""
+    every_ns: int | None = None
+    """Simulated: measures at multiples of this from ``t_0`` on, and not at every step."""
+    jitter_ns: int = 0
+    """Simulated: the moment of a measurement lies up to so much after its turn."""
+    clock_error_ns: int = 0
+    """Simulated: its stamps are wrong by up to so much."""
 
     @property
     def true_r(self) -> tuple[float, ...]:
@@ -175,6 +204,14 @@ class SupervisorSettings:
 
 
 @dataclass(frozen=True)
+class ScheduledModel:
+    """``[[model.schedule]]``: the model, without outputs, that is in force from step ``first`` on."""
+
+    first: int
+    model: LSUModel | ContinuousModel
+
+
+@dataclass(frozen=True)
 class Configuration:
     """One mesh: its model, peers and services."""
 
@@ -197,15 +234,63 @@ class Configuration:
     """The TOML values that all of this was read from, flags and environment included."""
 
     identifiers: Mapping[str, IdentifierSettings] = field(default_factory=dict)
+    continuous: ContinuousModel | None = None
+    """Of ``[model] continuous = true``, without outputs; ``base_model`` then is that of the first step."""
+    schedule: tuple[ScheduledModel, ...] = ()
+    """Models that replace the first one from a step on, in order."""
+    input_delay_ns: int = 0
+    """An input may take so long to act after its step began."""
+
+    @functools.cached_property
+    def grid(self) -> Grid:
+        """``t_k = start + k dt`` in nanoseconds."""
+        mesh = self.mesh
+        dt = exact_dt(mesh.dt) if mesh.exact_dt is None else mesh.exact_dt
+        if mesh.start_ns is not None:
+            return Grid(mesh.start_ns, dt)
+        return Grid(0 if mesh.start_time is None else start_time_ns(mesh.start_time)[0], dt)
+
+    def flow(self, k: int) -> ContinuousModel | None:
+        """The continuous model in force from t_k on; ``None`` for discrete models."""
+        found = self.continuous
+        for entry in self.schedule:
+            if entry.first <= k and isinstance(entry.model, ContinuousModel):
+                found = entry.model
+        return found
+
+    def stretch_model(self, k: int) -> LSUModel:
+        """The model without outputs that drives step k to k + 1; ``base_model`` where there is no other."""
+        flow = self.flow(k)
+        if flow is not None:
+            return flow.discretised(self.grid.time_of(k + 1) - self.grid.time_of(k))
+        found = self.base_model
+        for entry in self.schedule:
+            if entry.first <= k and isinstance(entry.model, LSUModel):
+                found = entry.model
+        return found
+
+    @property
+    def has_one_model(self) -> bool:
+        """Whether every step is driven by ``base_model`` itself, as of a discrete model without a schedule."""
+        return self.continuous is None and not self.schedule
 
     def model(self, sensors: Iterable[str]) -> LSUModel:
         """The model whose rows of C are those of the named sensors, in the order of their names."""
         chosen = [self.sensors[name] for name in sorted(sensors)]
         rows = [row for sensor in chosen for row in sensor.C]
+        further: dict[str, Any] = {}
+        if any(sensor.D for sensor in chosen):
+            p = self.base_model.input_count
+            further["D"] = [row for sensor in chosen for row in (sensor.D or [(0.0,) * p] * len(sensor.C))]
+        if any(sensor.offset for sensor in chosen):
+            further["d"] = [d for sensor in chosen for d in (sensor.offset or (0.0,) * len(sensor.C))]
+        if any(sensor.period for sensor in chosen):
+            further["period"] = [d for sensor in chosen for d in (sensor.period or (0.0,) * len(sensor.C))]
         return self.base_model.replace(
             C=np.array(rows).reshape(len(rows), self.base_model.state_count),
             r=[width for sensor in chosen for width in sensor.r],
             outputs=[name for sensor in chosen for name in sensor.outputs],
+            **further,
         )
 
     @property
