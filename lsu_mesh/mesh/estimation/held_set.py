@@ -90,11 +90,6 @@ class HeldSet:
         self.epochs.restore({})
         self.reach.lose()
 
-    def begin_from_prior(self, prior: Support) -> None:
-        """Hold the prior of step 1."""
-        self.begin(prior, "prior", restarted=False)
-        self.reach.begin(prior)
-
     def start_from(self, base: Base, used: Iterable[Reference] = ()) -> None:
         """Note that the engine now holds a set made from ``base`` and ``used`` alone."""
         self.guarantee, self.unsound = self.best_guarantee, ""

@@ -313,9 +313,8 @@ class Estimator(Node):
     def _start_from_prior(self, first: int) -> bool:
         if any(self._input_missing(j) for j in range(1, first)):
             return False
-        self.held.begin_from_prior(self.configuration.prior)
-        self._waiting = ""
-        self.timeline.begin(1)
+        self._begin(1, self.configuration.prior, "prior", restarted=False)
+        self.held.reach.begin(self.configuration.prior)
         return True
 
     def _input_missing(self, k: int) -> bool:
@@ -323,9 +322,9 @@ class Estimator(Node):
             return False
         return not self.timeline.has_input(k)
 
-    def _begin(self, k: int, support: Support, base: Base) -> None:
-        """Begin in the middle of a run, at step k, with a set that surely holds its state."""
-        self.held.begin(support, base, restarted=True)
+    def _begin(self, k: int, support: Support, base: Base, *, restarted: bool = True) -> None:
+        """Begin at step k, with a set that surely holds its state; ``restarted``: in the middle of a run."""
+        self.held.begin(support, base, restarted=restarted)
         self._waiting = ""
         self.timeline.begin(k)
 

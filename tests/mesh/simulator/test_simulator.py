@@ -39,8 +39,8 @@ def seeds_until_found(demo: Path, faults: tuple[str, ...] = FAULTS) -> tuple[int
 def test_a_stale_set_taken_as_current_is_found(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begin = Estimator._begin
 
-    def begin_now(self: Estimator, k: int, support: Support, base: Base) -> None:
-        begin(self, max(k, self.timeline.arrivals.newest), support, base)
+    def begin_now(self: Estimator, k: int, support: Support, base: Base, *, restarted: bool = True) -> None:
+        begin(self, max(k, self.timeline.arrivals.newest), support, base, restarted=restarted)
 
     monkeypatch.setattr(Estimator, "_begin", begin_now)
     _, outcome = seeds_until_found(demo)
