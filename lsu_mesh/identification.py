@@ -119,8 +119,9 @@ def explain(
         No factor explains the data: what is kept contradicts them.
     """
     _check(learn, margin, share)
-    structure = Structure(model, unknown=unknown)
-    data = record(structure, Y, U)
+    plain, data = _plain(model, Y, U)
+    structure = Structure(plain, unknown=unknown)
+    data = record(structure, data.Y, data.U)
     box = Orthotope(*prior) if isinstance(prior, tuple) else prior
     count = min(len(data.Y), max(2, round(share * len(data.Y))))
     answer = smallest(structure, Record(data.Y[:count], data.U[: count - 1]), learn, box)
@@ -129,6 +130,8 @@ def explain(
     r = answer.r * (margin if grown_r else 1.0)
     found = structure.model_at(answer.theta, rho, r)
     rest = Record(data.Y[count:], data.U[count:]) if len(data.Y) - count >= 2 else None
+    held_out = None if rest is None else _try(found, rest, count + 1)
+    found = _restored(found, model)
     return Explanation(
         model=found,
         rho=rho,
@@ -142,8 +145,41 @@ def explain(
         entries=structure.entries,
         first=1,
         last=count,
-        held_out=None if rest is None else _try(found, rest, count + 1),
+        held_out=held_out,
     )
+
+
+def _plain(model: LSUModel, Y: ArrayLike, U: ArrayLike | None) -> tuple[LSUModel, Record]:
+    """The model without D, a and d, and its data: ``y − D u − d``, and for the offset an input that is 1."""
+    if not isinstance(model, LSUModel):
+        raise ModelError("identification takes a discrete model: give A, B and rho of one step")
+    if model.period is not None or model.radii is not None:
+        part = "period" if model.radii is None else "continuous model"
+        raise ModelError(f"identification knows no {part}: unwrap the outputs, or discretise and drop the radii, first")
+    checked = record(Structure(model.replace(D=None, a=None, d=None)), Y, U)
+    if model.D is None and model.a is None and model.d is None:
+        return model, checked
+    outputs, inputs = np.array(checked.Y), checked.U
+    if model.d is not None:
+        outputs -= model.d
+    if model.D is not None:
+        last = np.array(U, dtype=np.float64).reshape(-1, model.input_count)[len(inputs) : len(outputs)]
+        if len(last) == 0:
+            raise ModelError(f"D ≠ 0: the last output depends on the last input; give U with {len(outputs)} rows")
+        outputs -= np.vstack([inputs, last]) @ model.D.T
+    if model.a is None:
+        return model.replace(D=None, d=None), Record(outputs, inputs)
+    B = np.zeros((model.state_count, 0)) if model.B is None else model.B
+    plain = model.replace(B=np.hstack([B, model.a.reshape(-1, 1)]), a=None, D=None, d=None)
+    return plain, Record(outputs, np.hstack([inputs, np.ones((len(inputs), 1))]))
+
+
+def _restored(found: LSUModel, model: LSUModel) -> LSUModel:
+    """The found model with the offset and the parts of the outputs where they were."""
+    if model.a is not None and found.B is not None:
+        p = model.input_count
+        found = found.replace(B=found.B[:, :p] if p else None, inputs=model.inputs, a=found.B[:, p])
+    return found if model.has_plain_outputs else found.replace(D=model.D, d=model.d)
 
 
 def smallest(structure: Structure, data: Record, learn: Learn, first: Orthotope | None = None) -> WindowSolution:

@@ -12,6 +12,7 @@ import numpy as np
 
 BITS = 448
 ONE = 1 << BITS
+OWN_ROUNDING = 1 << 48
 Table = np.ndarray
 """Of Python integers (dtype object)."""
 
@@ -67,5 +68,5 @@ def floats(table: Table) -> np.ndarray:
 
 
 def within(table: Table, middle: np.ndarray, radius: np.ndarray) -> bool:
-    """Whether ``|table − middle| ≤ radius`` in every entry, exactly."""
-    return bool((np.abs(table - fixed(middle)) <= fixed(radius)).all())
+    """Whether ``|table − middle| ≤ radius`` in every entry, to 2⁻⁴⁰⁰: the rounding of the table itself."""
+    return bool((np.abs(table - fixed(middle)) <= fixed(radius) + OWN_ROUNDING).all())

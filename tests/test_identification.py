@@ -93,3 +93,25 @@ def test_bounds_of_zero_have_no_ratio() -> None:
     data = simulate(TRUE, 10, 1)
     with pytest.raises(ModelError, match="give their ratio"):
         explain(TRUE.replace(r=0.0), data.Y, data.U, learn="r")
+
+
+def test_offsets_and_feedthrough_are_taken_off_and_put_back() -> None:
+    """The bounds found are those of the same data without the offsets; the model found has them again."""
+    plain = LSUModel([[0.8]], [[1.0]], [[1.0]], 0.1, 0.2, domain=([-50.0], [50.0]))
+    full = plain.replace(D=[[2.0]], a=[0.5], d=[3.0])
+    data = simulate(full, 60, 3)
+    offset = 0.5 / (1.0 - 0.8)  # the plain state is x − offset
+    shifted = data.Y - 3.0 - 2.0 * data.U - offset
+    found, same = explain(full, data.Y, data.U), explain(plain, shifted, data.U)
+    np.testing.assert_allclose(found.factor, same.factor, rtol=1e-6)
+    assert found.model.a is not None
+    np.testing.assert_allclose(found.model.a, [0.5])
+    np.testing.assert_allclose(found.model.B, [[1.0]])  # type: ignore[arg-type]
+    assert found.model.D is not None
+    assert found.held_out is not None
+    assert same.held_out is not None
+    np.testing.assert_allclose(found.held_out.factor, same.held_out.factor, rtol=1e-6)
+    with pytest.raises(ModelError, match="give U with 60 rows"):
+        explain(full, data.Y, data.U[:-1])
+    with pytest.raises(ModelError, match="identification knows no period"):
+        explain(plain.replace(period=360.0), data.Y, data.U)

@@ -6,11 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_flow import fixed, floats, flow, times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lsu_mesh import LSUModel, ModelError, simulate, systems
-from lsu_mesh.simulation import measure, next_state, random_corner, random_normal, random_uniform
+from lsu_mesh.simulation import NOISE_SHARE, measure, next_state, random_corner, random_normal, random_uniform
 from lsu_mesh.testing.exact_plant import exact_product
 
 
@@ -91,3 +92,38 @@ def test_inputs() -> None:
         simulate(model, 5, 1, inputs=np.zeros((4, 1)))
     with pytest.raises(ModelError, match="x1 must have 2"):
         simulate(model, 5, 1, x1=[0.0])
+
+
+def test_the_truth_of_a_continuous_plant_is_that_of_the_exact_flow() -> None:
+    """At any moment within a step, to the last digits: the noise is constant within a step."""
+    flow_model = LSUModel.continuous(
+        [[0.0, 1.0], [-4.0, -0.5]], [[0.0], [1.0]], [[1.0, 0.0]], [0.3], [0.1], [[0.5], [1.0]], a=[0, 0.2]
+    )
+    run = simulate(flow_model, 5, 1, x1=[1.0, 0.0], dt_ns=100_000_000)
+    assert run.times == [100_000_000 * k for k in range(1, 6)]
+    A, rates = fixed(flow_model.rates.A), flow_model.rates
+    for k in range(5):
+        drive = fixed(rates.B @ run.U[k] + rates.a + rates.noise_map @ (NOISE_SHARE * rates.rho * run.units[k]))  # type: ignore[operator]
+        for rest in (0, 1, 33_333_333, 99_999_999):
+            E, F = flow(A, rest)
+            exact = floats(times(E, fixed(run.X[k])) + times(F, drive))
+            np.testing.assert_allclose(run.truth_at(run.times[k] + rest), exact, rtol=1e-13, atol=1e-14)
+    np.testing.assert_array_equal(run.truth_at(run.times[2]), run.X[2])
+    np.testing.assert_array_equal(run.input_at(run.times[2] + 5), run.U[2])
+    with pytest.raises(ModelError, match="the simulation goes from"):
+        run.truth_at(99_999_999)
+    with pytest.raises(ModelError, match="dt_ns, the length of a step, belongs to a continuous model"):
+        simulate(flow_model, 5, 1)  # type: ignore[call-overload]
+
+
+def test_outputs_with_offsets_and_periods_keep_their_bounds() -> None:
+    model = LSUModel(
+        [[1.0]], [[1.0]], [[1.0], [1.0]], 0.1, 0.25, D=[[2.0], [0.0]], a=[30.0], d=[1.0, 0.0], period=[0, 360.0]
+    )
+    run = simulate(model, 50, 2, noise="corners")
+    for x, y, u in zip(run.X, run.Y, run.U, strict=True):
+        assert abs(Fraction(y[0]) - Fraction(x[0]) - 2 * Fraction(u[0]) - 1) <= Fraction(0.25)
+        assert -180.0 <= y[1] < 180.0
+        assert abs((y[1] - x[0] + 180.0) % 360.0 - 180.0) <= 0.25 + 1e-9
+    for before, after, u in zip(run.X, run.X[1:], run.U, strict=False):
+        assert abs(Fraction(after[0]) - Fraction(before[0]) - Fraction(u[0]) - 30) <= Fraction(0.1)

@@ -104,11 +104,18 @@ class FilterBank:
         outcome = self._sweep(outputs, inputs, False, True)[1]
         return np.equal(outcome[:, 1], batch_run.DONE)
 
-    def run(self, Y: ArrayLike, U: ArrayLike | None = None) -> tuple[FilterRun, NDArray[np.int64]]:
+    def run(
+        self, Y: ArrayLike, U: ArrayLike | None = None, *, times: object = None, models: object = None
+    ) -> tuple[FilterRun, NDArray[np.int64]]:
         """All rows of Y (N, T, m) with inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
 
-        An instance with fewer rows done than T met a contradiction there; its further rows are NaN.
+        An instance with fewer rows done than T met a contradiction there; its further rows are NaN. Times of the rows
+        and models of one row each are refused: :func:`lsu_mesh.run_filter` takes them.
         """
+        if times is not None or models is not None:
+            raise ModelError(
+                "a bank knows no times and no models of one row; use run_filter with each filter by itself"
+            )
         m, p = self._models.C.shape[1], self._model.input_count
         outputs = np.array(Y, dtype=np.float64)
         if outputs.ndim != 3 or outputs.shape[0] != len(self) or outputs.shape[2] != m:

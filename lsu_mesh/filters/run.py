@@ -90,8 +90,9 @@ def run_filter(
         elif where == batch_run.IN_PREDICT:
             _predict(filter, inputs, row - 1)
         return run
+    is_plain = filter.model.has_plain_outputs  # filters of other packages need not know u then
     for k in range(len(outputs)):
-        store_output(run, k, filter.predict_output(inputs[k]))
+        store_output(run, k, filter.predict_output() if is_plain else filter.predict_output(inputs[k]))
         _update(filter, outputs, inputs, k)
         store_set(run, k, filter)
         if k + 1 < len(outputs):
@@ -126,7 +127,10 @@ def _inputs(U: ArrayLike | None, rows: int, columns: int, needs_last: bool) -> M
 
 def _update(filter: Filter, Y: Matrix, U: Matrix, row: int) -> None:
     try:
-        filter.update(Y[row], u=U[row])
+        if filter.model.has_plain_outputs:
+            filter.update(Y[row])
+        else:
+            filter.update(Y[row], u=U[row])
     except LsuMeshError as error:
         raise named_row(row, error) from error
 

@@ -62,12 +62,14 @@ def time_widening(
     true statement on x(t) at the nominal t. Where D ≠ 0 update with the hull of the inputs as a box besides. ``None``
     where there is no such box: subdivide, or leave the data out.
     """
+    if error_ns == 0:
+        return np.zeros(outputs.output_count)
     box = state_box(flow, lower, upper, error_ns=error_ns, u=u)
     if box is None:
         return None
     center, half_widths = _with_offset(flow.rates, *input_interval(u, flow.input_count))
     drift = np.empty(outputs.output_count)
-    seconds = math.nextafter(error_ns / 1e9, math.inf) if error_ns else 0.0
+    seconds = math.nextafter(error_ns / 1e9, math.inf)
     output_drift(
         np.array(outputs.C), *flow.arrays, seconds, center, half_widths,
         np.array(box.lower), np.array(box.upper), drift,

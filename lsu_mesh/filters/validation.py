@@ -36,6 +36,10 @@ class KernelModel(NamedTuple):
 
 def kernel_model(model: LSUModel) -> KernelModel:
     """The arrays of ``model``; the identity stands for a missing noise map, no column for a missing B."""
+    if not isinstance(model, LSUModel):
+        raise ModelError(
+            f"a filter takes the model of a step, not {model!r}: of a continuous one give .discretised(ns)"
+        )
     n = model.state_count
     B = np.zeros((n, 0)) if model.B is None else model.B
     N = np.eye(n) if model.noise_map is None else model.noise_map

@@ -7,7 +7,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_plant import Exact, exact_product, inside_box, measured, unit_noise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -30,6 +29,7 @@ from lsu_mesh import (
     simulate,
     systems,
 )
+from lsu_mesh.testing.exact_plant import Exact, exact_product, inside_box, measured, unit_noise
 
 MADE = (LSUO, LSUP, LSUPB, LSUCZ, ZonotopicKalman)
 BOX = Orthotope([-1.0, -1.0], [1.0, 1.0])

@@ -139,6 +139,8 @@ class Structure:
 
 def check_window_model(model: LSUModel) -> None:
     """Raises ``ModelError`` where the model has a part that the window programs do not know."""
+    if not isinstance(model, LSUModel):
+        raise ModelError(f"the window estimators know no continuous model, as {model!r} is one")
     parts = {"D": model.D, "a": model.a, "d": model.d, "period": model.period, "radii": model.radii}
     given = [name for name, part in parts.items() if part is not None]
     if given:

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from exact_flow import ONE, Flow, doubled, fixed, floats, flow, times, within
+from exact_flow import ONE, OWN_ROUNDING, Flow, doubled, fixed, floats, flow, times, within
 
 from lsu_mesh.kernels.discretisation.stretch import discretise
 
@@ -54,7 +54,7 @@ def worst_noise(step: Flow, N: np.ndarray, rho: np.ndarray, d: np.ndarray) -> in
 
 def reach(columns: np.ndarray, widths: np.ndarray, d: np.ndarray) -> int:
     """The support ``Σ_j |d' g_j| widths_j`` of the noise in direction d, exactly, times 2⁴⁴⁸."""
-    return int(times(np.abs(times(fixed(d), fixed(columns))), fixed(widths))) + columns.shape[1]
+    return int(times(np.abs(times(fixed(d), fixed(columns))), fixed(widths))) + OWN_ROUNDING
 
 
 def holds(rng: np.random.Generator, kind: str) -> bool:
