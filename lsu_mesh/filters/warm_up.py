@@ -62,7 +62,7 @@ def warm_up() -> float:
 def _timed_steps(prior: Orthotope) -> None:
     """A continuous model at times of its own, with feedthrough, offsets, a period and a time error."""
     flow = LSUModel.continuous(
-        [[-0.1, 1.0], [0.0, -0.2]], [[0.0], [1.0]], [[1.0, 0.0], [1.0, 1.0]], 0.05, 0.5,
+        [[-0.1, 1.0], [0.0, -0.2]], [[0.0], [1.0]], [[1.0, 0.0], [1.0, 1.0]], rho=0.05, r=0.5,
         D=[[0.1], [0.0]], a=[0.1, 0.0], d=[0.1, 0.0], period=[0.0, 360.0],
     )  # fmt: skip
     data = simulate(flow, STEPS, seed=1, dt_ns=10**8)
