@@ -205,6 +205,9 @@ def test_what_does_not_fit_is_named() -> None:
         run_filter(filter, Y, dt_ns=5)
     with pytest.raises(ModelError, match=r"a bank knows no radii \(a continuous model\)"):
         FilterBank(LSUO, drawn.flow.discretised(SECOND), [drawn.prior] * 2)
+    bank = FilterBank(LSUO, LSUModel([[1.0]], None, [[1.0]], 0.1, 0.1), [Orthotope([0.0], [1.0])] * 2)
+    with pytest.raises(ModelError, match="a bank knows no times and no models of one row"):
+        bank.run(np.zeros((2, 3, 1)), times=[0, 1, 2])
     with pytest.raises(ModelError, match="the window estimators know no radii"):
         WindowMAP(drawn.flow.discretised(SECOND), drawn.prior)
 

@@ -57,7 +57,7 @@ def exponential(
             F[i, j], F_radius[i, j] = T[i, j], 0.0
     scale(X, X_radius, t * 0.5**doublings, TIME_UNITS)
     power = 0
-    while power < MAX_POWER and not _is_negligible(T, F, power):
+    while power < MAX_POWER and (power == 0 or not _is_negligible(T, F)):
         power += 1
         product(T, T_radius, X, X_radius, S, S_radius)
         assign(T, T_radius, S, S_radius)
@@ -78,10 +78,8 @@ def exponential(
 
 
 @inner
-def _is_negligible(T: Matrix, F: Matrix, power: int) -> bool:
-    """Whether the term of this power adds nothing to any digit of the sum."""
-    if power == 0:
-        return False
+def _is_negligible(T: Matrix, F: Matrix) -> bool:
+    """Whether the term T of the series adds nothing to any digit of the sum F."""
     for i in range(T.shape[0]):
         for j in range(T.shape[1]):
             if abs(T[i, j]) > NEGLIGIBLE * abs(F[i, j]):

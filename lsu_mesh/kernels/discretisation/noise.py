@@ -31,15 +31,16 @@ MAX_GROWTH = 20.0
 
 @inner
 def slices(
-    A: Matrix, N: Matrix, rho: Vector, h: float, m: int,
+    A: Matrix, N: Matrix, rho: Vector, h: float,
     G: Matrix, box: Vector, E: Matrix, E_radius: Matrix, work: NDArray[np.float64],
 ) -> float:  # fmt: skip
-    """Fills the generators G (n, q (m + 1)), the box (n,) and ``E ± E_radius ⊇ e^{Ah}``.
+    """Fills the generators G (n, q (m + 1)), whose width says m, the box (n,) and ``E ± E_radius ⊇ e^{Ah}``.
 
     A (n, n), N (n, q), rho (q,), work (12, n, n). Returns the looseness, see :func:`looseness`; infinite, and nothing
     is filled, where ``A δ`` is too large.
     """
     n, q = N.shape
+    m = G.shape[1] // q - 1
     step, step_radius, now, now_radius = work[6], work[7], work[8], work[9]
     delta = h / m
     reached, most = np.zeros(n), np.zeros(n)

@@ -63,7 +63,7 @@ def _noise(A: Matrix, N: Matrix, rho: Vector, h: float, work: NDArray[np.float64
     norm, halvings, m = row_norm(A) * h, 0, 1
     while norm <= USEFUL_NORM or m == 1:
         G = np.empty((n, q * (m + 1)))
-        loose = slices(A, N, rho, h, m, G, box, E, E_radius, work)
+        loose = slices(A, N, rho, h, G, box, E, E_radius, work)
         if loose <= 1.0:
             return G, box
         if m == MAX_SLICES:
@@ -74,7 +74,7 @@ def _noise(A: Matrix, N: Matrix, rho: Vector, h: float, work: NDArray[np.float64
         halvings += 1
         norm *= 0.5
         if norm <= USEFUL_NORM:
-            loose = slices(A, N, rho, h * 0.5**halvings, MAX_SLICES, G, box, E, E_radius, work)
+            loose = slices(A, N, rho, h * 0.5**halvings, G, box, E, E_radius, work)
     most = max(q * (MAX_SLICES + 1), 8 * n)
     for _ in range(halvings):
         G, box = _doubled(G, box, E, E_radius)
