@@ -200,7 +200,8 @@ def account(
         duplicates=int((gaps == 0).sum()), out_of_order=data.out_of_order, span=_span(data), period=_period(data, gaps),
         largest_distance_ns=int(placed.distance_ns[delivered].max(initial=0)),
         off_grid=int((off_grid & delivered).sum()),
-        by_tolerance=int((~off_grid & delivered & (placed.distance_ns > data.time_half_ns)).sum()), by_time=data.time_ns is not None, notes=data.notes,
+        by_tolerance=int((~off_grid & delivered & (placed.distance_ns > data.time_half_ns)).sum()),
+        by_time=data.time_ns is not None, notes=data.notes,
         error=why_unplayable(data, grid, last_step) if not delivered.any() or has_other_epoch(data, grid) else None,
         doubts=(
             *off_grid_doubt(placed.distance_ns[off_grid & delivered], nearest and not shares),

@@ -26,7 +26,8 @@ TEXT, FLAG, WHOLE = {"text", "number in quotes"}, {"true", "false"}, {"whole"}
 POSITIVE = {"whole", "whole float", "float"}
 NUMBER = {*POSITIVE, "zero", "negative", "negative float"}
 TAKEN: dict[str, set[str]] = {
-    "mesh.name": {"number in quotes"}, "mesh.dt": {*POSITIVE, "number in quotes"}, "mesh.steps": WHOLE, "mesh.seed": {"whole", "zero"},
+    "mesh.name": {"number in quotes"}, "mesh.dt": {*POSITIVE, "number in quotes"}, "mesh.steps": WHOLE,
+    "mesh.seed": {"whole", "zero"},
     "mesh.rate": POSITIVE, "mesh.start_time": {*NUMBER, "number in quotes", "date"},
     "model.rho": {*POSITIVE, "zero"}, "model.continuous": {"false"}, "model.input_delay": {"zero"},
     "model.schedule": {"empty list"}, "model.schedule[0].rho": {*POSITIVE, "zero"},
