@@ -7,18 +7,43 @@ from msgspec import Struct
 
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import VERSION
+from lsu_mesh.model import ContinuousModel, LSUModel
 
 
-class SensorRows(Struct, frozen=True, kw_only=True):
-    """One sensor: ``y = C x + v``, ``|v| ≤ r``."""
+class SensorRows(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One sensor: ``y = C x + D u + d + v``, ``|v| ≤ r``; what is 0 is not told."""
 
     C: list[list[float]]
     r: list[float]
     outputs: list[str]
+    D: list[list[float]] | None = None
+    d: list[float] | None = None
+    period: list[float] | None = None
+    """y is known up to multiples of it; 0 where an output has none."""
+
+
+class Dynamics(Struct, frozen=True, kw_only=True):
+    """``A x + B u + offset + noise_map w``, ``|w| ≤ rho``: dx/dt of a continuous model, x_(k+1) of a discrete one."""
+
+    A: list[list[float]]
+    B: list[list[float]] | None
+    offset: list[float] | None
+    noise_map: list[list[float]] | None
+    rho: list[float]
+
+
+class LaterModel(Struct, frozen=True, kw_only=True):
+    """What is in force from step ``first`` on."""
+
+    first: int
+    model: Dynamics
 
 
 class ModelAnswer(Struct, frozen=True, kw_only=True):
-    """``x_(k+1) = A x_k + B u_k + noise_map w_k``, ``|w_k| ≤ rho``, with the names of all its parts."""
+    """``x_(k+1) = A x_k + B u_k + offset + noise_map w_k``, ``|w_k| ≤ rho``, with the names of all its parts.
+
+    Of a continuous model this is its first step, to rounding.
+    """
 
     v: int = VERSION
     model: str
@@ -31,9 +56,14 @@ class ModelAnswer(Struct, frozen=True, kw_only=True):
     units: list[str]
     sensors: dict[str, SensorRows]
     start_ns: int | None = None
-    """Kept for the time of step 0; not told yet."""
+    """The time of step 0; ``None``: the file has none."""
     boot: str | None = None
     """Kept for the boot of the answering process; not told yet."""
+    offset: list[float] | None = None
+    continuous: Dynamics | None = None
+    """The rates of a continuous model; ``None`` for a discrete one."""
+    schedule: list[LaterModel] | None = None
+    """Models that replace this one later."""
 
 
 def model_answer(configuration: Configuration) -> ModelAnswer:
@@ -49,9 +79,28 @@ def model_answer(configuration: Configuration) -> ModelAnswer:
         states=list(model.states),
         units=list(model.units),
         sensors={
-            name: SensorRows(C=[list(row) for row in sensor.C], r=list(sensor.r), outputs=list(sensor.outputs))
+            name: SensorRows(
+                C=[list(row) for row in sensor.C], r=list(sensor.r), outputs=list(sensor.outputs),
+                D=[list(row) for row in sensor.D] or None, d=list(sensor.offset) or None,
+                period=list(sensor.period) or None,
+            )
             for name, sensor in configuration.sensors.items()
         },
+        start_ns=configuration.mesh.start_ns,
+        offset=None if model.a is None else model.a.tolist(),
+        continuous=None if configuration.continuous is None else _dynamics(configuration.continuous),
+        schedule=[LaterModel(first=one.first, model=_dynamics(one.model)) for one in configuration.schedule] or None,
+    )  # fmt: skip
+
+
+def _dynamics(model: LSUModel | ContinuousModel) -> Dynamics:
+    parts = model.rates if isinstance(model, ContinuousModel) else model
+    return Dynamics(
+        A=parts.A.tolist(),
+        B=None if parts.B is None else parts.B.tolist(),
+        offset=None if parts.a is None else parts.a.tolist(),
+        noise_map=None if parts.noise_map is None else parts.noise_map.tolist(),
+        rho=parts.rho.tolist(),
     )
 
 

@@ -35,3 +35,28 @@ def test_what_a_model_does_not_have_is_nil(tmp_path: Path) -> None:
     )
     told = msgpack.unpackb(encode_model(model_answer(load(file))))
     assert (told["B"], told["noise_map"]) == (None, None)
+
+
+def test_the_parts_of_a_full_model_are_told(tmp_path: Path) -> None:
+    file = tmp_path / "mesh.toml"
+    file.write_text(
+        '[mesh]\nname = "full"\ndt = "1/4"\nstart_time = 100.000000001\n'
+        "[model]\ncontinuous = true\nA = [[-1.0]]\nB = [[2.0]]\noffset = [0.5]\nrho = [0.1]\n"
+        "schedule = [{ from = 9, A = [[-2.0]] }]\n"
+        "[model.prior]\nlower = [0.0]\nupper = [1.0]\n[plant]\n"
+        "[sensors.s]\nC = [[1.0]]\nr = [0.1]\nD = [[3.0]]\noffset = [0.25]\nperiod = [360.0]\n"
+        '[sensors.t]\nC = [[1.0]]\nr = [0.1]\n[filters.f]\nkind = "LSUO"\nsensors = ["s"]\n'
+    )
+    configuration = load(file)
+    told = msgpack.unpackb(encode_model(model_answer(configuration)))
+    first = configuration.base_model
+    assert first.a is not None
+    assert (told["A"], told["offset"]) == (first.A.tolist(), first.a.tolist()), "those of one dt"
+    rates = {"A": [[-1.0]], "B": [[2.0]], "offset": [0.5], "noise_map": None, "rho": [0.1]}
+    assert told["continuous"] == rates
+    assert told["schedule"] == [{"first": 9, "model": rates | {"A": [[-2.0]]}}]
+    assert (told["dt"], told["start_ns"]) == (0.25, 100_000_000_001)
+    assert told["sensors"]["s"] == {
+        "C": [[1.0]], "r": [0.1], "outputs": ["s"], "D": [[3.0]], "d": [0.25], "period": [360.0],
+    }  # fmt: skip
+    assert set(told["sensors"]["t"]) == {"C", "r", "outputs"}, "what is 0 is not told"

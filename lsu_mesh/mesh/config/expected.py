@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, Generic, TypeVar
 
 from lsu_mesh.mesh.config.problem import closest, nearest
@@ -21,6 +22,10 @@ WHOLE_LIMIT = 2**53
 SHOWN_LENGTH = 60
 _DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*(us|ms|s|min)")
 _UNIT_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0}
+_SPAN = re.compile(r"([0-9]{1,18}(?:\.[0-9]{1,18})?)\s*(ns|us|ms|s|min)")
+_UNIT_NS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9}
+MOST_NS = 2**62
+"""146 years: longer spans are not counted in nanoseconds."""
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
@@ -187,6 +192,27 @@ def duration(low: float = 0.0) -> Expected[float]:
         return seconds
 
     return Expected(f'a duration of at least {low:g} s such as "50ms", "0.2s" or "1min"', convert)
+
+
+def span_ns(low: int = 0) -> Expected[int]:
+    """A time such as "5ms", or a number of seconds, in whole nanoseconds; nothing is rounded."""
+
+    def convert(value: Any) -> int:
+        match = _SPAN.fullmatch(value) if isinstance(value, str) else None
+        if match is not None:
+            span = Fraction(match[1]) * _UNIT_NS[match[2]]
+        elif is_number(value):
+            span = Fraction(repr(value)) * 10**9  # the decimal as it is written
+        else:
+            raise Unfit
+        if span.denominator != 1:
+            raise Unfit("it is no whole number of nanoseconds")
+        if not low <= span < MOST_NS:
+            raise Unfit
+        return int(span)
+
+    least = f"of at least {low} ns " if low else ""
+    return Expected(f'a duration {least}such as "5ms" or "200us", or a number of seconds', convert)
 
 
 def each(words: str, of: Expected[T]) -> Expected[list[T]]:

@@ -6,34 +6,30 @@ Precedence: flag (``-X table.key=value``) > environment (``LSU_MESH_TABLE__KEY``
 from __future__ import annotations
 
 import copy
-import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import date
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from lsu_mesh.errors import ModelError
-from lsu_mesh.mesh.config.expected import Expected, Unfit, shown
+from lsu_mesh.mesh.config.exact_times import keep_digits, spell_out_dates
+from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.filters import kind_of, read_filter
 from lsu_mesh.mesh.config.fusion import check_learning, read_fusion, read_identifier, shared_sensor_warnings
+from lsu_mesh.mesh.config.mesh_table import grid_of_table, read_mesh
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
 from lsu_mesh.mesh.config.overrides import apply, from_environment, from_flags
 from lsu_mesh.mesh.config.problem import ConfigurationError, Problem, Problems
 from lsu_mesh.mesh.config.sensors import read_plant, read_sensor
 from lsu_mesh.mesh.config.settings import (
     Configuration,
-    MeshSettings,
     RecorderSettings,
     SupervisorSettings,
 )
 from lsu_mesh.mesh.config.system import read_model
 from lsu_mesh.mesh.config.table import Table
 from lsu_mesh.mesh.config.toml_lines import key_lines
-from lsu_mesh.mesh.data_files.moments import start_time_ns
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
 
 
@@ -86,7 +82,7 @@ def load_values(
 
 
 def _checked(values: dict[str, Any], path: Path, problems: Problems) -> Configuration:
-    _spell_out_dates(values)
+    spell_out_dates(values)
     original = copy.deepcopy(values)
     configuration = _read(values, path, problems)
     problems.raise_if_any()
@@ -106,7 +102,9 @@ def _read_text(path: Path) -> str:
 
 def _read_toml(path: Path, text: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
+        values = tomllib.loads(text)
+        keep_digits(values, text)
+        return values
     except RecursionError:
         raise _unreadable(path, "not a TOML file: lists or tables are nested too deep", "a TOML file") from None
     except ValueError as error:  # TOMLDecodeError, or a whole number with too many digits for Python
@@ -122,11 +120,12 @@ def _unreadable(path: Path, text: str, expected: str, line: int | None = None) -
 
 def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configuration | None:
     root = Table(values, "", problems)
-    mesh = _read_mesh(root)
-    system = read_model(root.table("model", required=True), problems)
+    mesh = read_mesh(root)
+    grid = grid_of_table(mesh, problems)
+    system = read_model(root.table("model", required=True), problems, grid)
     model, prior, input_box = system.model, system.prior, system.input_box
     sensor_tables = _named(root, "sensors", problems)
-    sensors = {n: read_sensor(t, n, system.state_count, path.parent) for n, t in sensor_tables.items()}
+    sensors = {n: read_sensor(t, n, system, path.parent) for n, t in sensor_tables.items()}
     plant = read_plant(root.table("plant"), model, sensors, folder=path.parent, problems=problems)
     filter_tables, fusion_tables = _named(root, "filters", problems), _named(root, "fusion", problems)
     identifier_tables = _named(root, "identifier", problems)
@@ -183,41 +182,10 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
             )
         ),
         identifiers=dict(sorted(identifiers.items())),
+        continuous=system.continuous,
+        schedule=system.schedule,
+        input_delay_ns=system.input_delay_ns,
     )
-
-
-def _read_mesh(root: Table) -> MeshSettings:
-    table = root.table("mesh", required=True) or Table({"name": "mesh", "dt": 1.0}, "mesh", root.problems)
-    name = table.text("name")
-    if isinstance(name, str) and not is_name(name):
-        table.wrong("name", f'"{name}" is no name; expected {NAME_RULE}', NAME_RULE)
-    dt = table.number("dt", above=0.0)
-    if isinstance(dt, float) and not math.isfinite(1.0 / dt):
-        table.mismatch("dt", "a number whose inverse, the steps per second, is finite", f"{dt:g}")
-    steps = table.whole("steps", None, low=1)
-    seed = table.whole("seed", 1)
-    rate = table.number("rate", 1.0 / dt if isinstance(dt, float) else 1.0, above=0.0)
-    start_time: float | None = table.read("start_time", NO_START, START_TIME)
-    table.finish()
-    return MeshSettings(name=name, dt=dt, steps=steps, seed=seed, rate=rate, start_time=start_time)
-
-
-def _spell_out_dates(values: dict[str, Any]) -> None:
-    """``start_time`` as ISO text: the values are recorded, and a recording holds no dates of TOML."""
-    mesh = values.get("mesh")
-    if isinstance(mesh, dict) and isinstance(mesh.get("start_time"), date):
-        mesh["start_time"] = mesh["start_time"].isoformat()
-
-
-def _start_seconds(value: object) -> float | None:
-    try:
-        return float(Fraction(start_time_ns(value)[0], 10**9))
-    except ModelError:
-        raise Unfit from None
-
-
-NO_START: float | None = None
-START_TIME = Expected[float | None]("seconds since 1970, or a moment such as 2024-05-01T12:00:00Z", _start_seconds)
 
 
 def _named(root: Table, key: str, problems: Problems) -> dict[str, Table]:

@@ -8,12 +8,16 @@ from lsu_mesh.mesh.config.table import Table
 
 MUST = re.compile(r"(?:\w+ )?must (?:be |have |hold )?(?P<what>.+?)(?:[,:] (?:it|they|not|found)\b.*)?$", re.DOTALL)
 
+KEYS = {"a": "offset", "d": "offset"}
+"""Arguments of a model that have another name in the file."""
+
 
 def add_model_error(table: Table, sentence: str, key: str = "") -> None:
     """Note a sentence such as ``rho must have 3 entries, it has 2`` at the key that it begins with, or at ``key``."""
     word = re.match(r"\w+", sentence)
-    if not key and word is not None and word[0] in table.values:
-        key = word[0]
+    named = KEYS.get(word[0], word[0]) if word is not None else ""
+    if not key and word is not None and named in table.values:
+        key, sentence = named, f"{named}{sentence[word.end() :]}"
     text = sentence.removeprefix(f"{key} ") if key else sentence
     table.wrong(key, text, expected_of(sentence))
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 from typing import Any, NamedTuple
 
+from lsu_mesh.mesh.config.exact_times import is_moment, with_all_digits
 from lsu_mesh.mesh.config.expected import SHOWN_LENGTH
 from lsu_mesh.mesh.config.filters import ALIASES
 from lsu_mesh.mesh.config.network import SECRET
@@ -63,7 +65,7 @@ def apply(values: dict[str, Any], overrides: Sequence[Override], problems: Probl
             continue
         for other in _other_spellings(tables, last):
             table.pop(other, None)
-        table[last] = _value(override.value)
+        table[last] = _value(override.value, keeps_digits=is_moment(override.key))
         problems.sources[override.key] = override.source
 
 
@@ -73,8 +75,10 @@ def _other_spellings(tables: Sequence[str], key: str) -> list[str]:
     return [name for pair in spellings for name in pair if name != key]
 
 
-def _value(text: str) -> Any:
+def _value(text: str, *, keeps_digits: bool) -> Any:
+    line = f"value = {text}"
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        value = tomllib.loads(line)["value"]
+        return with_all_digits(value, tomllib.loads(line, parse_float=Decimal)["value"]) if keeps_digits else value
     except (ValueError, RecursionError):
         return text  # a bare word is a string

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from lsu_mesh.errors import LsuMeshError
@@ -67,6 +69,18 @@ class DataProblem(Problem):
         fields = super().as_record()
         del fields["words"]
         return fields
+
+
+def data_problem(table: str, path: Path, words: str) -> DataProblem:
+    """A line about a file of measurements; it begins with the file and, where there is one, the line of the file."""
+    text = words.removeprefix(f"{path}: ")
+    place = re.match(r"line ([0-9]+)", text)
+    asked = re.search(r"expected (.+?), found ('(?:[^'])*'|[^;]+)", text)
+    expected, found = (asked[1], asked[2]) if asked else ("a file of data with the columns that the table names", None)
+    line = int(place[1]) if place else None
+    return DataProblem(
+        file=str(path), table=table, key="file", text=text, expected=expected, found=found, line=line, words=words
+    )
 
 
 class ConfigurationError(LsuMeshError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +10,10 @@ from typing import get_args
 from lsu_mesh.mesh.config.data_file_keys import KEYS, read_file_format
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
-from lsu_mesh.mesh.config.problem import DataProblem, Problems
+from lsu_mesh.mesh.config.problem import Problems, data_problem
+from lsu_mesh.mesh.config.sensor_parts import read_further_outputs, read_timing
 from lsu_mesh.mesh.config.settings import FaultKind, MeasurementFileSettings, PlantSettings, SensorFault, SensorSettings
+from lsu_mesh.mesh.config.system import System
 from lsu_mesh.mesh.config.table import REQUIRED, Table, file_at
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
 from lsu_mesh.model import LSUModel
@@ -50,11 +51,11 @@ def read_plant(
     return PlantSettings(name, None if x1 is None else tuple(x1), inputs, file)
 
 
-def read_sensor(table: Table, name: str, states: int | None, folder: Path) -> SensorSettings:
+def read_sensor(table: Table, name: str, system: System, folder: Path) -> SensorSettings:
     """``[sensors.NAME]``."""
     rows = table.matrix("C")
     is_read = isinstance(rows, list)
-    rows = rows if is_read else [[0.0]]
+    rows, states = rows if is_read else [[0.0]], system.state_count
     if states is not None and is_read and len(rows[0]) != states:
         table.mismatch("C", f"{states} columns, one per state", len(rows[0]))
     widths = table.vector("r")
@@ -79,6 +80,8 @@ def read_sensor(table: Table, name: str, states: int | None, folder: Path) -> Se
     faults = tuple(_read_fault(item) for item in table.tables("faults"))
     if faults and source == "file":
         table.without("faults", "faults are simulated, a sensor that plays a file has none", "remove the key")
+    further = read_further_outputs(table, len(rows) if is_read else None, system.model)
+    timing = read_timing(table, len(rows) if is_read else None, system, is_simulated=source == "simulated")
     table.finish()
     return SensorSettings(
         name=name,
@@ -88,6 +91,8 @@ def read_sensor(table: Table, name: str, states: int | None, folder: Path) -> Se
         file=file,
         faults=faults,
         simulated_r=simulated,
+        **further,
+        **timing,
     )
 
 
@@ -129,18 +134,6 @@ def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementF
     try:
         header = read_columns(settings, default_count=count).columns
     except FileProblems as error:
-        table.problems.records += [_data_problem(table, path, line) for line in error.lines]
+        table.problems.records += [data_problem(table.path, path, line) for line in error.lines]
         return settings
     return replace(settings, columns=header)
-
-
-def _data_problem(table: Table, path: Path, words: str) -> DataProblem:
-    """A line of :class:`FileProblems`, which begins with the file and, where there is one, the line."""
-    text = words.removeprefix(f"{path}: ")
-    place = re.match(r"line ([0-9]+)", text)
-    asked = re.search(r"expected (.+?), found (.+)$", text)
-    expected, found = (asked[1], asked[2]) if asked else ("a CSV file with the columns that the table names", None)
-    line = int(place[1]) if place else None
-    return DataProblem(
-        file=str(path), table=table.path, key="file", text=text, expected=expected, found=found, line=line, words=words
-    )

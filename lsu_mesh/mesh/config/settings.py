@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import math
-import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -14,8 +12,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from lsu_mesh.array_types import Matrix
 from lsu_mesh.filters.grid import OffGrid
+from lsu_mesh.mesh.config.digest import digest
 from lsu_mesh.mesh.config.problem import Problem
 from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
 from lsu_mesh.mesh.data_files.settings import DataFileSettings
@@ -293,6 +291,14 @@ class Configuration:
             **further,
         )
 
+    @functools.cached_property
+    def _outputs(self) -> Mapping[str, LSUModel]:
+        return {name: self.model([name]) for name in self.sensors}
+
+    def outputs(self, sensor: str) -> LSUModel:
+        """The outputs of one sensor: C, D, d, period and r of its rows, with the dynamics of ``base_model``."""
+        return self._outputs[sensor]
+
     @property
     def cached(self) -> int:
         """Messages per key that a publisher keeps for those who come late, or who missed them."""
@@ -300,14 +306,8 @@ class Configuration:
         return given if given is not None else max(LEAST_CACHED, math.ceil(CACHED_SECONDS * self.mesh.rate))
 
     def digest(self) -> str:
-        """16 hexadecimal characters over A, B, C, noise_map and the sensors' rows, not over bounds."""
-        state = hashlib.blake2b(digest_size=8)
-        for matrix in (self.base_model.A, self.base_model.B, self.base_model.noise_map):
-            _digest_matrix(state, matrix)
-        for name in sorted(self.sensors):
-            state.update(name.encode())
-            _digest_matrix(state, np.array(self.sensors[name].C, dtype=np.float64))
-        return state.hexdigest()
+        """16 hexadecimal characters over the mathematics of the mesh, not over bounds; see ``docs/protocol.md``."""
+        return digest(self)
 
     def peers(self) -> list[tuple[str, str]]:
         """``(role, name)`` of every peer, in the order in which they are started."""
@@ -319,10 +319,3 @@ class Configuration:
         if self.plant is not None:
             listed.append(("plant", self.plant.name))
         return listed
-
-
-def _digest_matrix(state: Any, matrix: Matrix | None) -> None:
-    shape: Sequence[int] = (0, 0) if matrix is None else matrix.shape
-    state.update(struct.pack("<2q", *shape))
-    if matrix is not None:
-        state.update((matrix + 0.0).astype("<f8").tobytes())

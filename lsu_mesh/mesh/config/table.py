@@ -84,6 +84,15 @@ class Table:
         """A list of finite numbers."""
         return self.read(key, default, expected.VECTOR)
 
+    def number_or_vector(self, key: str, default: Any = REQUIRED) -> Any:
+        """One number for all entries, or a list of them."""
+        is_number = isinstance(self.values.get(key), int | float)
+        return self.number(key, default) if is_number else self.vector(key, default)
+
+    def span_ns(self, key: str, default: Any = 0, low: int = 0) -> Any:
+        """A time such as "5ms", or a number of seconds, in whole nanoseconds."""
+        return self.read(key, default, expected.span_ns(low))
+
     def matrix(self, key: str, default: Any = REQUIRED) -> Any:
         """A list of rows of one length."""
         return self.read(key, default, expected.MATRIX)

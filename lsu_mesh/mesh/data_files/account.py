@@ -37,12 +37,19 @@ class Placement:
 
 
 def place(
-    data: DataFile, grid: Grid, last_step: int | None = None, *, nearest: bool = True, tolerance_ns: int = 0
+    data: DataFile,
+    grid: Grid,
+    last_step: int | None = None,
+    *,
+    nearest: bool = True,
+    shares: bool | None = None,
+    tolerance_ns: int = 0,
 ) -> Placement:
     """Put every row on a step.
 
-    ``nearest``: the step whose t_k is nearest, one row each. Else the step with ``t_{k−1} < t ≤ t_k``, any number of
-    rows each; a row within ``tolerance_ns``, or half the spacing of its time, of a t_k is of step k.
+    ``nearest``: the step whose t_k is nearest. Else the step with ``t_{k−1} < t ≤ t_k``; a row within
+    ``tolerance_ns``, or half the spacing of its time, of a t_k is of step k. ``shares``: any number of rows on a
+    step, else the first one only; by default only without ``nearest``.
     """
     steps, distance = _steps(data, grid, nearest=nearest, tolerance_ns=tolerance_ns)
     before = steps < 1
@@ -58,8 +65,12 @@ def place(
         is_before=before,
         is_after=after,
         is_sharing=sharing,
-        is_delivered=inside & ~sharing if nearest else inside,
+        is_delivered=inside if _shares(nearest, shares) else inside & ~sharing,
     )
+
+
+def _shares(nearest: bool, shares: bool | None) -> bool:
+    return not nearest if shares is None else shares
 
 
 def _steps(data: DataFile, grid: Grid, *, nearest: bool, tolerance_ns: int) -> tuple[Integers, Integers]:
@@ -103,6 +114,8 @@ class Account:
     largest_distance_ns: int
     off_grid: int
     """Rows that are not within the tolerance of a t_k."""
+    by_tolerance: int
+    """Rows that are within the tolerance of a t_k, and not at it."""
     by_time: bool
     notes: tuple[str, ...]
     error: str | None
@@ -124,6 +137,8 @@ class Account:
         if self.by_time:
             far = duration_text(self.largest_distance_ns)
             found.append(f"  farthest from the grid: {far}; {_count(self.off_grid, 'row')} off the grid")
+            if self.by_tolerance:
+                found.append(f"  on the grid within the tolerance, and not exactly: {_count(self.by_tolerance, 'row')}")
         found.append(f"  left out: {self._reasons() or 'nothing'}")
         if self.out_of_order or self.duplicates:
             found.append(
@@ -153,14 +168,21 @@ class Account:
 
 
 def account(
-    data: DataFile, grid: Grid, last_step: int | None = None, *, nearest: bool = True, tolerance_ns: int | None = None
+    data: DataFile,
+    grid: Grid,
+    last_step: int | None = None,
+    *,
+    nearest: bool = True,
+    shares: bool | None = None,
+    tolerance_ns: int | None = None,
 ) -> Account:
     """Count what becomes of every row, as :func:`place` puts it.
 
     ``tolerance_ns`` defaults to half a unit of the last digit of the file's times, at least 1 ns.
     """
     tolerance = max(1, data.digit_ns // 2) if tolerance_ns is None else tolerance_ns
-    placed = place(data, grid, last_step, nearest=nearest, tolerance_ns=tolerance)
+    shares = _shares(nearest, shares)
+    placed = place(data, grid, last_step, nearest=nearest, shares=shares, tolerance_ns=tolerance)
     values, delivered = data.values, placed.is_delivered
     used = placed.steps[delivered & ~placed.is_sharing]  # each step once
     first, last = (int(used.min()), int(used.max())) if len(used) else (0, 0)
@@ -172,15 +194,17 @@ def account(
     return Account(
         path=str(data.path), rows=data.row_count + data.blank, blank=data.blank, delivered=int(delivered.sum()),
         before=int(placed.is_before.sum()), after=int(placed.is_after.sum()), sharing=int(placed.is_sharing.sum()),
-        leaves_sharing_out=nearest, first_step=first, last_step=last,
+        leaves_sharing_out=not shares, first_step=first, last_step=last,
         steps_used=len(used), steps_without=last - first + 1 - len(used) if len(used) else 0,
         missing_values=int(is_missing.sum()), empty_rows=int(is_missing.all(axis=1).sum()),
         duplicates=int((gaps == 0).sum()), out_of_order=data.out_of_order, span=_span(data), period=_period(data, gaps),
         largest_distance_ns=int(placed.distance_ns[delivered].max(initial=0)),
-        off_grid=int((off_grid & delivered).sum()), by_time=data.time_ns is not None, notes=data.notes,
+        off_grid=int((off_grid & delivered).sum()),
+        by_tolerance=int((~off_grid & delivered & (placed.distance_ns > data.time_half_ns)).sum()),
+        by_time=data.time_ns is not None, notes=data.notes,
         error=why_unplayable(data, grid, last_step) if not delivered.any() or has_other_epoch(data, grid) else None,
         doubts=(
-            *off_grid_doubt(placed.distance_ns[off_grid & delivered], nearest),
+            *off_grid_doubt(placed.distance_ns[off_grid & delivered], nearest and not shares),
             *period_doubt(data, grid, gaps),
             *late_doubt(data, grid, first),
         ),

@@ -57,6 +57,26 @@ def proposed_start(first_ns: int, grid: Grid) -> str:
     return text if "." in text else f"{text}.0"
 
 
+def off_grid_error(count: int, rows: int, largest_ns: int, sensor: str | None) -> str:
+    """Rows between steps and a model that knows nothing there; ``sensor`` is None for a file of inputs."""
+    said = (
+        f"{count} of {rows} rows {'lies' if count == 1 else 'lie'} off the grid, by up to {duration_text(largest_ns)}"
+    )
+    text = f"{said}, and a discrete model knows nothing between steps; set [model] continuous = true"
+    if sensor is None:
+        return f"{text}, or take a dt and start_time that have a step at each row"
+    here = f"[sensors.{sensor}]"
+    return (
+        f'{text}, or {here} rate = [the bound of |dy/dt|], or {here} off_grid = "nearest" (no set is guaranteed then)'
+    )
+
+
+def nearest_doubt(count: int, largest_ns: int) -> str:
+    """Rows that count as measured at another moment than their own, as the sensor asks for."""
+    said = f"{count} {'row lies' if count == 1 else 'rows lie'} off the grid, by up to {duration_text(largest_ns)}"
+    return f'{said}, and off_grid = "nearest": every set will say guarantee = "none"'
+
+
 def off_grid_doubt(distances_ns: NDArray[np.int64], nearest: bool) -> tuple[str, ...]:
     """Rows that are taken as measured at another moment than their own."""
     if not nearest or not len(distances_ns):

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load
-from lsu_mesh.mesh.config.measurement_files import accounts
-from lsu_mesh.mesh.data_files import DataFileError
+from lsu_mesh.mesh.config.measurement_files import PlayedFileError, accounts
+from lsu_mesh.mesh.config.step_noise import noise_of_one_dt
 from lsu_mesh_services.configuration import print_problems
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.network.security import missing_files
@@ -31,9 +31,9 @@ def main(options: argparse.Namespace) -> int:
         return USAGE
     try:
         played = accounts(configuration)
-    except DataFileError as error:
+    except PlayedFileError as error:
         if options.json:
-            _print_lines([{"level": "error", "file": str(configuration.path), "text": line} for line in error.lines])
+            _print_lines([record.as_record() for record in error.records])
         else:
             print(explained(error), file=sys.stderr)
         return USAGE
@@ -42,11 +42,14 @@ def main(options: argparse.Namespace) -> int:
     if options.json:
         records = [{"level": "warning", "file": str(configuration.path), "text": text} for text in doubts]
         summary = _summary(configuration, len(warnings) + len(doubts)) | {"files": as_records(played)}
+        noises = [noise.as_record() for noise in noise_of_one_dt(configuration)]
+        summary |= {"noise_of_one_dt": noises} if noises else {}
         _print_lines([*(warning.as_record() for warning in warnings), *records, summary])
         return OK
     peers = [f"{role} {name}" for role, name in configuration.peers()]
     fine = f"{options.file}: fine; mesh {configuration.mesh.name!r} with {len(peers)} peers: {', '.join(peers)}"
-    lines = [line for one in played.values() for line in one.lines()]
+    lines = [*(noise.line() for noise in noise_of_one_dt(configuration))]
+    lines += [line for one in played.values() for line in one.lines()]
     print(*warnings, *doubts, *lines, fine, sep="\n", file=sys.stderr)
     return OK
 

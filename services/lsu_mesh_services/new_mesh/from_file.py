@@ -26,7 +26,7 @@ def _mesh(found: Survey) -> str:
         f"# Plays {found.path.name}. Every number below is a proposal from the data; rho and r are yours to know.",
         "[mesh]",
         f"name = {_text(_name(found.path.stem))}",
-        "# seconds between two steps: the median period of the rows",
+        "# seconds between two steps, at which sets are published: the median period of the rows",
         f"dt = {_number(found.dt)}",
     ]
     if found.start_ns is not None:
@@ -38,20 +38,20 @@ def _mesh(found: Survey) -> str:
 
 
 def _model(found: Survey) -> str:
-    dt, count = float(found.dt), len(found.columns)
+    count = len(found.columns)
     states = [name for column in found.columns for name in (column, f"{column}.speed")]
     prior = [_prior(found, i) for i in range(count)]
     lower = [number for center, half, speed in prior for number in (center - half, -speed)]
     upper = [number for center, half, speed in prior for number in (center + half, speed)]
     return "\n".join(
         [
-            "# Position and speed of each column; its acceleration is constant for a step, and at most rho.",
-            "# In continuous time this is ẋ = A x + N w with, per column, A = [[0, 1], [0, 0]] and N = [[0], [1]].",
+            "# Position and speed of each column, dx/dt = A x + noise_map w; w is the acceleration, at most rho at every",
+            "# moment. In continuous time every row is used at its own moment, wherever the steps are.",
             "[model]",
-            f"A = {_blocks([[1.0, dt], [0.0, 1.0]], count)}",
-            f"noise_map = {_blocks([[dt * dt / 2], [dt]], count)}",
-            "# largest acceleration, in units of the column per s²: a guess from second differences; noise is in it,",
-            "# so that `lsu-mesh identify` may find a smaller one",
+            "continuous = true",
+            f"A = {_blocks([[0.0, 1.0], [0.0, 0.0]], count)}",
+            f"noise_map = {_blocks([[0.0], [1.0]], count)}",
+            "# largest acceleration, in units of the column per s²: a guess from second differences; noise is in it",
             f"rho = {_list([_acceleration(found, i) for i in range(count)])}",
             f"states = {json.dumps(states, ensure_ascii=False)}",
             "",
@@ -123,10 +123,8 @@ def _number(value: Fraction) -> str:
 
 
 def _start(ns: int) -> str:
-    """In seconds; to the microsecond where a number of TOML holds no more."""
+    """In seconds; all digits count."""
     text = seconds_text(ns)
-    if Fraction(repr(float(text))) != Fraction(text):
-        text = seconds_text(ns // 1000 * 1000)
     return text if "." in text else f"{text}.0"
 
 

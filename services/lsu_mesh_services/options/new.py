@@ -21,4 +21,4 @@ def add(commands: Commands) -> None:
         "--columns", metavar="A,B", help="columns of values of the data (default: all that hold numbers)"
     )
     parser.add_argument("--force", action="store_true", help="write over a file that is there")
-    parser.set_defaults(handler="lsu_mesh_services.commands.new")
+    parser.set_defaults(handler="lsu_mesh_services.commands.new", extra=None)

@@ -80,8 +80,8 @@ def test_all_mistakes_of_a_model_are_told_at_once_and_sensors_are_checked_beside
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("dt = 0.02", "dt = 0", "[mesh] dt: expected a number > 0, found 0"),
-        ("dt = 0.02", "dt = nan", "[mesh] dt: expected a number > 0, found nan"),
+        ("dt = 0.02", "dt = 0", '[mesh] dt: expected a number > 0, or a fraction such as "1/30", found 0'),
+        ("dt = 0.02", "dt = nan", '[mesh] dt: expected a number > 0, or a fraction such as "1/30", found nan'),
         ("dt = 0.02", "", "[mesh] dt: is missing; expected a number > 0"),
         ('name = "demo"', 'name = "a/b"', "[mesh] name: \"a/b\" is no name; expected 1 to 64 ASCII letters"),
         ("rho = [0.1, 0.1, 0.1]", "rho = [0.1]", "[model] rho: must have 3 entries, one per process noise"),

@@ -53,11 +53,13 @@ def test_a_file_of_which_nothing_plays_is_a_mistake(tmp_path: Path, demo: str) -
 
 def test_what_is_played_is_what_is_counted(tmp_path: Path, demo: str) -> None:
     text = demo.replace("dt = 0.02", "dt = 0.02\nstart_time = 0.0")
-    configuration = playing(tmp_path, text, "t,y\n0.02,1\n0.041,2\n0.039,3\n-1,4\n0.1,\n", 'time = "t"')
+    keys = 'time = "t"\ngrid_tolerance = "1ms"'
+    configuration = playing(tmp_path, text, "t,y\n0.02,1\n0.041,2\n0.039,3\n-1,4\n0.1,\n", keys)
     found, file = accounts(configuration)["sensors.s1"], configuration.sensors["s1"].file
     assert file is not None
     played = read_playback(file, 0.02, 0.0)
-    assert (found.rows, found.delivered, found.before, found.sharing) == (5, 3, 1, 1)
+    assert (found.rows, found.delivered, found.before, found.sharing) == (5, 4, 1, 1)
+    assert (found.off_grid, found.by_tolerance) == (0, 2)
     assert played.steps.tolist() == [1, 2, 5]
     assert (played.collisions, found.steps_used) == (1, 3)
 

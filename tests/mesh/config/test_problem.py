@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from lsu_mesh.mesh.config import ConfigurationError, Problem, load
+from lsu_mesh.mesh.config.measurement_files import PlayedFileError, accounts
+from lsu_mesh.mesh.config.mesh_table import DT
 
 
 def records(file: Path, *overrides: str, environment: dict[str, str] | None = None) -> tuple[Problem, ...]:
@@ -109,7 +111,7 @@ def test_a_key_that_is_missing_is_said_at_its_table(demo: Path, tmp_path: Path) 
     file = tmp_path / "mesh.toml"
     file.write_text(demo.read_text().replace("dt = 0.02", "", 1))
     (one,) = records(file)
-    assert (one.table, one.key, one.found, one.expected) == ("mesh", "dt", None, "a number > 0")
+    assert (one.table, one.key, one.found, one.expected) == ("mesh", "dt", None, DT.words)
     assert file.read_text().splitlines()[(one.line or 0) - 1] == "[mesh]"
 
 
@@ -135,9 +137,12 @@ def test_a_mistake_in_measurements_has_their_file_and_line(demo: Path, tmp_path:
     (tmp_path / "s1.csv").write_text("step,y\n1,0.5\n2,high\n")
     file = tmp_path / "mesh.toml"
     file.write_text(demo.read_text().replace("C = [[1.0, 0.0, 0.5]]", 'C = [[1.0, 0.0, 0.5]]\nfile = "s1.csv"', 1))
-    (one,) = records(file)
+    with pytest.raises(PlayedFileError) as caught:
+        accounts(load(file))
+    (one,) = caught.value.records
     assert (one.file, one.line, one.table, one.key) == (str(tmp_path / "s1.csv"), 3, "sensors.s1", "file")
     assert str(one).startswith(f"{tmp_path / 's1.csv'}: line 3, column 'y': expected a number")
+    assert one.found == "'high'"
     assert set(one.as_record()) == set(Problem("", "", "", "", "").as_record())
 
 

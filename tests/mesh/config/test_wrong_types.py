@@ -26,9 +26,14 @@ TEXT, FLAG, WHOLE = {"text", "number in quotes"}, {"true", "false"}, {"whole"}
 POSITIVE = {"whole", "whole float", "float"}
 NUMBER = {*POSITIVE, "zero", "negative", "negative float"}
 TAKEN: dict[str, set[str]] = {
-    "mesh.name": {"number in quotes"}, "mesh.dt": POSITIVE, "mesh.steps": WHOLE, "mesh.seed": {"whole", "zero"},
-    "mesh.rate": POSITIVE, "mesh.start_time": NUMBER,
-    "model.rho": {*POSITIVE, "zero"},
+    "mesh.name": {"number in quotes"}, "mesh.dt": {*POSITIVE, "number in quotes"}, "mesh.steps": WHOLE,
+    "mesh.seed": {"whole", "zero"},
+    "mesh.rate": POSITIVE, "mesh.start_time": {*NUMBER, "number in quotes", "date"},
+    "model.rho": {*POSITIVE, "zero"}, "model.continuous": {"false"}, "model.input_delay": {"zero"},
+    "model.schedule": {"empty list"}, "model.schedule[0].rho": {*POSITIVE, "zero"},
+    "model.schedule[0].from": {*POSITIVE, "number in quotes", "date"},
+    "sensors.*.time_error": {"zero"}, "sensors.*.jitter": {"zero"}, "sensors.*.clock_error": {"zero"},
+    "sensors.*.every": POSITIVE, "sensors.*.grid_tolerance": {*POSITIVE, "zero"},
     "plant.name": {"number in quotes"},
     "plant.file": TEXT, "sensors.*.file": TEXT,
     "sensors.*.simulated_r": {"empty list"}, "sensors.*.faults": {"empty list"},
@@ -52,9 +57,9 @@ TAKEN: dict[str, set[str]] = {
 """What each key takes of ``VALUES``; a key that is not here takes none of them."""
 SAID_ELSEWHERE = {
     "model.prior.lower": "model.prior.upper", "model.domain.lower": "model.domain.upper",
-    "model.input_box.lower": "model.input_box.upper",
+    "model.input_box.lower": "model.input_box.upper", "model.continuous": "filters.window",
 }  # fmt: skip
-"""Limits of other lengths: the mistake is told at the second one."""
+"""Limits of other lengths: the mistake is told at the second one; that a class refuses a model, at its filter."""
 TABLES = (
     "mesh", "model", "model.prior", "model.domain", "model.input_box", "plant", "sensors", "sensors.s1", "filters",
     "filters.box", "fusion", "fusion.main", "identifier", "identifier.bounds", "recorder", "network", "network.tls",
@@ -75,6 +80,8 @@ def general(path: str) -> str:
 def with_value(path: str, value: object) -> dict[str, Any]:
     """The example with one key replaced."""
     values: dict[str, Any] = copy.deepcopy(tomllib.loads(EXAMPLE.read_text()))
+    if path.startswith("model.schedule["):
+        values["model"]["schedule"] = [{"from": 400, "rho": [0.1, 0.1, 0.1]}]
     *outer, last = re.findall(r"\w+", path)
     table: Any = values
     for part in outer:

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from lsu_mesh_services.cli import main
 
-from lsu_mesh.mesh.config import load
+from lsu_mesh.filters.lsuo import LSUO
+from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.config.measurement_files import accounts
+from lsu_mesh.mesh.data_files import read
 
 ROWS = 40
 SECONDS = [f"{1600120070 + k / 5:.1f}" for k in range(ROWS)]
@@ -65,9 +67,11 @@ def test_bounds_come_from_the_data(tmp_path: Path) -> None:
     assert sensor.r == (min(np.diff(np.unique(np.array(HEIGHTS, dtype=float)))).round(6) / 2,)
     assert sensor.outputs == ("height",)
     assert "# not used, because they hold no numbers: who" in written.read_text()
-    np.testing.assert_array_equal(configuration.base_model.A, [[1, 0.2], [0, 1]])
+    assert configuration.continuous is not None
+    np.testing.assert_array_equal(configuration.continuous.rates.A, [[0, 1], [0, 0]])
+    np.testing.assert_allclose(configuration.base_model.A, [[1, 0.2], [0, 1]])
     seen = np.abs(np.diff(np.array(HEIGHTS, dtype=float), 2)).max() / 0.04
-    assert configuration.base_model.rho[0] == pytest.approx(1.5 * seen, rel=0.01)
+    assert configuration.continuous.rates.rho[0] == pytest.approx(1.5 * seen, rel=0.01)
 
 
 def test_iso_times_tabs_and_odd_names_are_taken(tmp_path: Path) -> None:
@@ -85,18 +89,53 @@ def test_numpy_files_are_taken(tmp_path: Path) -> None:
     assert accounts(configuration)["sensors.data"].delivered == 5
 
 
-def test_a_filter_finds_no_contradiction_in_what_it_was_made_from(tmp_path: Path) -> None:
-    from lsu_mesh.filters.registry import filter_class
-    from lsu_mesh.mesh.config.measurement_files import read_playback
+def irregular() -> tuple[list[str], list[str]]:
+    """A drive that is reported every .3 to 2 s, to the nearest decimetre, with stamps of nanoseconds."""
+    rng = np.random.default_rng(7)
+    seconds = np.cumsum(rng.uniform(0.3, 2.0, ROWS))
+    stamps = [1714564800_123456789 + round(second * 1e9) for second in seconds]
+    return [f"{ns // 10**9}.{ns % 10**9:09d}" for ns in stamps], [f"{20 * np.sin(s / 9):.1f}" for s in seconds]
 
-    configuration = load(new(tmp_path, "--from", "file", str(data(tmp_path, "time,height", SECONDS, HEIGHTS))))
-    file, mesh = configuration.sensors["data"].file, configuration.mesh
-    assert file is not None
-    played = read_playback(file, mesh.dt, mesh.start_time)
-    one = filter_class("LSUO")(configuration.model(["data"]), configuration.prior)  # type: ignore[call-arg]
-    for y in played.values:
+
+def played_through(configuration: Configuration) -> int:
+    """Rows that a filter takes, each at its moment, without a contradiction."""
+    sensor = configuration.sensors["data"]
+    assert sensor.file is not None
+    data = read(sensor.file)
+    assert data.time_ns is not None
+    flow, model = configuration.continuous, configuration.model(["data"])
+    one = LSUO(model, configuration.prior)
+    moment = configuration.grid.time_of(1)
+    for time_ns, y in zip(data.time_ns.tolist(), data.values, strict=True):
+        assert flow is not None
+        if time_ns > moment:
+            one.predict(model=flow.discretised(time_ns - moment))
         one.update(y)
-        one.predict()
+        moment = time_ns
+    return data.row_count
+
+
+@pytest.mark.parametrize("is_regular", [True, False])
+def test_a_filter_finds_no_contradiction_in_what_it_was_made_from(tmp_path: Path, is_regular: bool) -> None:
+    columns = (SECONDS, HEIGHTS) if is_regular else irregular()
+    written = new(tmp_path, "--from", "file", str(data(tmp_path, "time,height", *columns)))
+    assert played_through(load(written)) == ROWS
+
+
+def test_an_irregular_file_is_played_whole_and_from_its_first_nanosecond(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, heights = irregular()
+    written = new(tmp_path, "--from", "file", str(data(tmp_path, "time,height", times, heights)))
+    configuration = load(written)
+    account = accounts(configuration)["sensors.data"]
+    assert (account.delivered, account.left_out, account.first_step) == (ROWS, 0, 1)
+    assert configuration.grid.time_of(1) == int(times[0].replace(".", ""))
+    capsys.readouterr()
+    assert main(["validate", str(written)]) == 0
+    told = capsys.readouterr().err
+    assert "warning" not in told
+    assert "[model] noise of one dt (1.1 s), in state units: height " in told
 
 
 def test_a_file_that_is_there_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

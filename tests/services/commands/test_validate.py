@@ -39,7 +39,7 @@ def test_a_file_that_is_fine_is_one_line_with_counts(capsys: pytest.CaptureFixtu
     assert (code, words) == (OK, [])
     assert found == {
         "level": "fine", "file": str(demo), "mesh": "demo", "states": 3, "mistakes": 0, "warnings": 0,
-        "peers": {"filter": 3, "fusion": 1, "plant": 1, "recorder": 1, "sensor": 3},
+        "files": {}, "peers": {"filter": 3, "fusion": 1, "plant": 1, "recorder": 1, "sensor": 3},
     }  # fmt: skip
 
 
