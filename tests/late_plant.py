@@ -1,8 +1,8 @@
-"""A plant whose inputs come late, and its sensor: ``python late_plant.py ENDPOINT MESH STEPS``.
+"""A plant whose inputs come late, and its sensor: ``python late_plant.py ENDPOINT MESH STEPS PEER…``.
 
-It knows the protocol, zenoh and msgpack only. Every second input goes out only when a prediction was published without
-it, that is with the input box; every fourth only one step after that. The steps of these predictions are printed, as a
-JSON list.
+It knows the protocol, zenoh and msgpack only, and begins when the peers are there. Every second input goes out only
+when a prediction was published without it, that is with the input box; every fourth only one step after that. The
+steps of these predictions are printed, as a JSON list.
 """
 
 from __future__ import annotations
@@ -42,12 +42,24 @@ class Predictions:
             found = msgpack.unpackb(self._came.get(timeout=WITHIN_S))
 
 
-def main(endpoint: str, mesh: str, steps: int) -> None:
+def wait_for_peers(session: Any, mesh: str, peers: set[str]) -> None:
+    """Until each is there: a peer declares its token after its subscriptions."""
+    end = time.monotonic() + WITHIN_S
+    while time.monotonic() < end:
+        replies = list(session.liveliness().get(f"lsu/v1/{mesh}/live/*", timeout=1.0))
+        if peers <= {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies if reply.ok is not None}:
+            return
+        time.sleep(0.1)
+    raise TimeoutError(f"not all of {peers} are there")
+
+
+def main(endpoint: str, mesh: str, steps: int, peers: set[str]) -> None:
     boxed: list[int] = []
     with opened(endpoint) as session:
         predictions = Predictions(session, f"lsu/v1/{mesh}/prediction/f")
         sensor = session.declare_publisher(f"lsu/v1/{mesh}/measurement/s1")
         plant = session.declare_publisher(f"lsu/v1/{mesh}/input/plant")
+        wait_for_peers(session, mesh, peers)
         model = asked(session, mesh)["model"]
         while not (sensor.matching_status.matching and plant.matching_status.matching):
             time.sleep(0.01)
@@ -68,4 +80,4 @@ def main(endpoint: str, mesh: str, steps: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]), set(sys.argv[4:]))

@@ -19,6 +19,7 @@ from lsu_mesh.mesh.messages import Fused, Posterior, Prediction
 
 Start = Callable[..., Any]
 STEPS = 40
+PEERS = ("f", "g", "main", "recorder")
 MESH = """
 [mesh]
 name = "late"
@@ -64,7 +65,7 @@ def test_a_recording_of_late_inputs_verifies(
         start(*words, "-c", "mesh.toml", "-e", at, endpoint=at)
         for words in (("filter", "f"), ("filter", "g"), ("fusion", "main"))
     ]
-    command = [sys.executable, str(root / "tests" / "late_plant.py"), at, "late", str(STEPS)]
+    command = [sys.executable, str(root / "tests" / "late_plant.py"), at, "late", str(STEPS), *PEERS]
     with subprocess.Popen(command, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as plant:
         assert plant.stdout is not None
         boxed = json.loads(plant.stdout.readline())
