@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from lsu_mesh.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from lsu_mesh import metrics, systems
+    from lsu_mesh import metrics, systems, testing
     from lsu_mesh.errors import InconsistentData, LsuMeshError, ModelError, UnboundedSupport
     from lsu_mesh.filters import (
         LSUCZ,
@@ -48,6 +48,7 @@ else:
                 "ConstrainedZonotope", "Intersection", "Orthotope", "Parallelotope", "Support", "Zonotope",
             ),
             "lsu_mesh.systems": (),
+            "lsu_mesh.testing": (),
         },
     )  # fmt: skip
 
@@ -83,5 +84,6 @@ __all__ = [
     "run_filter",
     "simulate",
     "systems",
+    "testing",
 ]
 __version__ = "0.1.0"

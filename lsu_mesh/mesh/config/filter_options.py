@@ -97,7 +97,7 @@ def _refusal(make: Make, options: Mapping[str, Any]) -> str:
 
 
 def _blamed(sentence: str, make: Make, options: Mapping[str, Any], required: Collection[str]) -> str:
-    """The option that a sentence begins with, or names, or without which it is not said; empty for none."""
+    """The option that a sentence begins with or names, or without which it does not come; empty for none."""
     words = re.findall(r"\w+", sentence)
     for name in (*words[:1], *options):
         if name in words and name in options:

@@ -28,7 +28,7 @@ class Kind(NamedTuple):
 
     @property
     def is_guaranteed(self) -> bool:
-        """Whether the sets of such filters hold the state as long as the bounds do; of no class nothing is said."""
+        """Whether the sets of the class hold the state while the bounds hold; true where the class is not known."""
         return self.cls is None or self.cls.guarantee == "declared"
 
 
@@ -138,7 +138,7 @@ def _read_senders(
     senders = tuple(sorted(set(known if given is None else given)))
     if not senders:
         what = "a fusion" if transfer == "fused" else "another filter with guaranteed sets"
-        text = f'"{transfer}" has nobody to come from; give {what}, or set "off"'
+        text = f'"{transfer}" has no source; give {what}, or set "off"'
         table.wrong("transfer", text, f'"off", or {what} in the file')
     return senders
 
@@ -146,7 +146,7 @@ def _read_senders(
 def _read_options(
     table: Table, kind: Kind, sensors: Mapping[str, SensorSettings], chosen: tuple[str, ...], system: System
 ) -> dict[str, Any]:
-    """The options of the class, and what its constructor says of them as soon as it can be asked."""
+    """The options of the class; its constructor checks them too, if all that it needs is there."""
     if kind.cls is None:
         return table.rest()
     cls = kind.cls

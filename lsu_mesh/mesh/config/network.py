@@ -26,7 +26,7 @@ def protocol_of(endpoint: str) -> str:
 
 
 def is_open_to_others(endpoint: str) -> bool:
-    """Whether another host can reach the endpoint and nothing asks it who it is."""
+    """Whether another host can reach the endpoint without a certificate."""
     host = endpoint.partition("/")[2].partition("?")[0].partition("#")[0].rpartition(":")[0]
     return protocol_of(endpoint) not in (*ENCRYPTED, "unixsock-stream") and LOOPBACK.fullmatch(host) is None
 
@@ -81,7 +81,7 @@ def _read_tls(network: Table) -> TlsSettings:
 
 
 def check_reserved(network: NetworkSettings, names: Sequence[tuple[str, str]], problems: Problems) -> None:
-    """Where certificates carry names, some are taken; ``names`` are pairs of table and name."""
+    """Names that certificates reserve; ``names`` are pairs of table and name."""
     for table, name in names:
         if network.tls.enabled and name in RESERVED:
             text = f'no peer can be called "{name}" with network.tls: certificates use that name; choose another'
@@ -89,7 +89,7 @@ def check_reserved(network: NetworkSettings, names: Sequence[tuple[str, str]], p
 
 
 def open_endpoint_warnings(file: str, network: NetworkSettings) -> list[Problem]:
-    """Endpoints of the file that a peer listens on only when it is told that this is meant."""
+    """Endpoints of the file that need ``--insecure``."""
     text = (
         "can be reached from other hosts without TLS: listening there is refused without --insecure; enable network.tls"
     )

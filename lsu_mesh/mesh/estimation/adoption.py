@@ -1,4 +1,4 @@
-"""What a filter goes by: the declared bounds, or those that an identifier has found."""
+"""The bounds that a filter uses: the declared ones, or those that an identifier has found."""
 
 from __future__ import annotations
 
@@ -21,6 +21,6 @@ def make_engine(settings: FilterSettings, model: LSUModel, prior: Support) -> Fi
 
 
 def adopted_model(configuration: Configuration, settings: FilterSettings, message: Suggestion) -> LSUModel:
-    """The model of a filter with the suggested bounds; a sensor of which nothing is said keeps its r."""
+    """The model of a filter with the suggested bounds; a sensor that the suggestion does not name keeps its r."""
     r = [width for sensor in settings.sensors for width in message.r.get(sensor, configuration.sensors[sensor].r)]
     return configuration.model(settings.sensors).replace(rho=message.rho, r=r)

@@ -1,8 +1,8 @@
 """Epochs: which sets of others may still be used, and what the own set descends from.
 
 An epoch is one peer's ``(src, boot, number)``; a reset abandons it and opens the next. A set *descends* from every
-epoch whose sets went into it, its own and those of others, directly or through others. Messages carry these marks, so
-that two filters that listen to each other leave an abandoned epoch once, and do not bring each other back into it.
+epoch whose sets went into it, its own and those of others, directly or through others. Messages list these epochs. So
+two filters that use each other's sets both leave an abandoned epoch, and neither takes it over from the other again.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Epochs:
         return next((src for (src, boot), n in sorted(self._relied.items()) if n < self._newest[src, boot]), None)
 
     def record(self, message: Posterior | Prediction) -> None:
-        """Learn which epochs there are."""
+        """Remember the epoch of a message, and those that its set descends from."""
         for src, boot, number in _marks(message):
             self._newest[src, boot] = max(number, self._newest.get((src, boot), 0))
         self._forget_old_boots(message.src)
@@ -73,7 +73,7 @@ class Epochs:
         self._relied = dict(snapshot)
 
     def continue_from(self, number: int) -> None:
-        """Go on from an epoch of an earlier life."""
+        """Continue the numbers of an earlier process of this name."""
         self.number = self._newest[self._own] = max(self.number, number)
 
     def _forget_old_boots(self, src: str) -> None:

@@ -202,5 +202,5 @@ def _together(
 
 
 def fused_guarantee(guarantees: Sequence[Guarantee], faults: int) -> Guarantee:
-    """What a set is worth that holds the state although ``faults`` of its sources are wrong: the weakest are those."""
+    """Of a set that holds the state although ``faults`` sources are wrong: the weakest sources count as wrong."""
     return sorted(guarantees, key=WEAKNESS.index, reverse=True)[min(faults, len(guarantees) - 1)]

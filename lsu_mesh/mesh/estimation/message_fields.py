@@ -1,4 +1,4 @@
-"""What messages say of a set, beside the set itself."""
+"""The fields of a message that are computed from the engine, besides the set itself."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lsu_mesh.supports.parallelotope import Parallelotope
 
 
 def described(engine: Filter) -> dict[str, Any]:
-    """What a posterior says of the engine's set."""
+    """The fields of a posterior that the engine's set gives."""
     lower, upper = engine.bounds()
     own = engine.support
     is_plain = isinstance(own, Orthotope | Parallelotope)
@@ -27,7 +27,7 @@ def described(engine: Filter) -> dict[str, Any]:
 
 
 def foretold(engine: Filter) -> dict[str, Any]:
-    """What a prediction says of the engine's set and its outputs."""
+    """The fields of a prediction that the engine's set and its outputs give."""
     lower, upper = engine.bounds()
     band = engine.predict_output()
     return {
@@ -40,7 +40,7 @@ def foretold(engine: Filter) -> dict[str, Any]:
 
 
 def described_box(lower: Vector, upper: Vector) -> dict[str, Any]:
-    """What a fused set's message says of its bounds (n,), (n,)."""
+    """The fields of a fused set that its bounds (n,), (n,) give."""
     return {
         "lower": lower.tolist(),
         "upper": upper.tolist(),

@@ -1,4 +1,4 @@
-"""Who of a fusion's sources is left out again and again."""
+"""Which sources of a fusion are left out repeatedly."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Quarantine:
         self.members: set[str] = set()
 
     def record(self, k: int, left_out: Collection[str], agreed: Collection[str], say: Say) -> list[Message]:
-        """Note step k; the events of who goes in and who comes out."""
+        """Record step k; events for the sources that are quarantined now, and for those that are used again."""
         verdict = dict.fromkeys(agreed, False) | dict.fromkeys(left_out, True)
         self._verdicts[k] = verdict
         if k > self._newest:

@@ -1,4 +1,4 @@
-"""When the steps were first heard of."""
+"""When the first message of each step came."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ MAX_SIGNS = 65536
 
 
 class StepArrivals:
-    """The newest step, and when each step that was the newest was first heard of.
+    """The newest step, and for each step that was the newest, when its first message came.
 
     Parameters
     ----------
@@ -27,12 +27,12 @@ class StepArrivals:
         """When the last message came, of whatever step."""
 
     def is_from_the_future(self, k: int, now: int) -> bool:
-        """Whether a step is too far ahead to be true; were it believed, all else would be late."""
+        """Whether a step is too far ahead to be true; if it were believed, all other messages would be late."""
         passed = 0 if self.heard_at is None else max(0, now - self.heard_at)
         return k > self.newest + FURTHEST + int(4 * passed * self._rate)
 
     def record(self, k: int, now: int) -> None:
-        """Step k was heard of."""
+        """A message of step k has come."""
         self.heard_at = now
         if k > self.newest:
             self.newest = k
@@ -41,10 +41,10 @@ class StepArrivals:
                 del self._known[: MAX_SIGNS // 2]
 
     def of(self, k: int) -> int | None:
-        """When step k, or one after it, was first heard of."""
+        """When the first message of step k, or of one after it, came."""
         i = bisect_left(self._known, (k,))
         return self._known[i][1] if i < len(self._known) else None
 
     def forget_before(self, k: int) -> None:
-        """Nobody will ask for the steps before k."""
+        """Steps before k are not asked for any more."""
         del self._known[: bisect_left(self._known, (k,))]

@@ -28,12 +28,12 @@ from lsu_mesh.mesh.nodes.estimator import START_GRACE, About, Estimator
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint
 
 FAR_BEHIND_S, FAR_BEHIND = 2.0, 256
-"""So far behind, in time at the mesh's rate and in steps, and a fusion goes on where its sources are."""
+"""A fusion that is farther behind, in time at the mesh's rate or in steps, continues where its sources are."""
 CONTRADICTION = "sources contradict one another"
 DISJOINT = "own prediction was disjoint from what the sources agree on"
 """Causes of what is no plain step."""
 SILENT_STEPS = 5
-"""After so many steps without any message, a second at least, the fusion goes on by the clock."""
+"""After so many steps without any message, a second at least, the fusion takes steps by the clock."""
 
 
 class FusionNode(Estimator):
@@ -96,7 +96,7 @@ class FusionNode(Estimator):
         return [*self._skip_ahead(now), *super().advance(now)]
 
     def _skip_ahead(self, now: int) -> list[Message]:
-        """Far behind, join the sources where they are, like a fusion that starts late; what they know is enough."""
+        """Far behind, continue at the sources' step, like a fusion that starts late: their sets suffice to start."""
         if self.current is None or self.timeline.arrivals.newest - self.current <= self._far_behind:
             return []
         first = self.timeline.arrivals.newest - self.history
@@ -105,11 +105,11 @@ class FusionNode(Estimator):
         skipped, k = first - self.current, self.current
         self.join_again(first, now - START_GRACE)
         self._counts["skipped"] += skipped
-        text = f"too far behind: {skipped} steps from step {k} on are skipped; going on from what the sources say"
+        text = f"too far behind: {skipped} steps from step {k} on are skipped; continues from its sources' sets"
         return [self.event("WARN", "skipped-ahead", text, now=now, step=k, about={"step": k, "skipped": skipped})]
 
     def _sense_silence(self, now: int) -> None:
-        """When nothing at all has come for a while, steps go on by the clock; the set then grows, honestly."""
+        """When no message has come for a while, take steps by the clock; without data the set grows."""
         arrivals = self.timeline.arrivals
         if self.current is None or arrivals.heard_at is None or self.waiting_for():
             return
@@ -147,11 +147,11 @@ class FusionNode(Estimator):
         return Combined(status=status, used=used, missing=missing, origin=origin, cause=cause), messages
 
     def _passes_over(self) -> bool:
-        """Far behind, a step is only predicted through: nobody is told of it, and later sources know what it knew."""
+        """Whether the step is only predicted and not published, because the fusion is far behind."""
         return self.timeline.is_behind() and not self.held.unsound and self.held.epochs.abandoned is None
 
     def _conclude(self, k: int, outcome: FusionOutcome, now: int) -> tuple[Status, str | None, list[Message]]:
-        """What is said of a step: its status, the cause where it is not a plain one, and events."""
+        """A step's status, its cause where the status is not "ok", and events."""
         match outcome.basis:
             case "both":
                 return "ok", None, self._name_rejected(k, outcome.rejected, now)
@@ -209,7 +209,7 @@ class FusionNode(Estimator):
         return sources
 
     def _without_prediction(self, k: int, now: int) -> tuple[str, list[Message]]:
-        """The engine holds what the sources say alone: a new epoch begins, unless nothing was held before."""
+        """The engine holds the sources' intersection alone: a new epoch begins, unless no set was held before."""
         if self.held.unsound:
             cause = self.held.unsound
             self.start_from("sources")
@@ -231,7 +231,7 @@ class FusionNode(Estimator):
         return self.event("ERROR", "prediction-dropped", f"step {k}: {cause}", now=now, step=k, about=about)
 
     def _start_from_candidate(self) -> bool:
-        """A fusion that starts late takes what its sources say together of a step, once enough of them are there."""
+        """A fusion that starts late takes the intersection of its sources at a step, once enough of them are there."""
         for k, _ in reversed(self.timeline.steps()):
             if self._is_start(k):
                 self._begin(k, self.configuration.prior, "prior")
@@ -261,7 +261,7 @@ class FusionNode(Estimator):
         return messages
 
     def _record_rejected(self, k: int, agreeing: Sequence[Source], now: int) -> list[Message]:
-        """Events of who is quarantined, left out too often for whatever reason, and of who is let back in."""
+        """Events: which sources are quarantined, because they were left out too often, and which are used again."""
         left_out = {rejection.source for rejection in self._rejected}
         agreed = {source.name for source in agreeing} - left_out
         return self._quarantine.record(k, left_out, agreed, self._say_quarantine(k, now))
@@ -272,7 +272,7 @@ class FusionNode(Estimator):
             if is_in:
                 text = f"step {k}: {name} was left out {count} times and is quarantined"
                 return self.event("ERROR", "quarantined", text, now=now, step=k, about={"source": name, "step": k})
-            text = f"step {k}: {name} has agreed {count} times in a row and is let back in"
+            text = f"step {k}: {name} has agreed {count} times in a row and is used again"
             return self.event("INFO", "let-back-in", text, now=now, step=k, about={"source": name, "step": k})
 
         return say

@@ -1,8 +1,9 @@
-"""An identifier: watches measurements and inputs, and tells bounds that explain them.
+"""An identifier: watches measurements and inputs, and suggests bounds that explain them.
 
-Every so many steps it finds the smallest factor of the bounds in force with which some course of states passes through
-the window's data. At most 1: they are explained. Above: it says so, suggests bounds with a margin, announces the step
-at which filters may adopt them, and goes by these itself from then on.
+Every ``every`` steps it finds the smallest factor of the bounds in force for which a trajectory of states fits the data
+of the window. A factor of at most 1: the bounds explain the data. A larger factor: it publishes a suggestion, the
+bounds times the factor and a margin, with the step at which filters may adopt them, and uses these itself from then
+on.
 """
 
 from __future__ import annotations
@@ -154,12 +155,13 @@ class IdentifierNode(Node):
             whose = "declared" if self._model is self._declared else "adopted"
             text = (
                 f"the {whose} bounds no longer explain the data of steps {first} to {last}: they would have to be "
-                f"{factor:.4g} times as large; from step {suggestion.adopt_at} on {self.settings.margin:g} times that"
+                f"{factor:.4g} times as large; suggested from step {suggestion.adopt_at} on: "
+                f"{self.settings.margin:g} times that"
             )
             about["adopt_at"] = suggestion.adopt_at
             return [self.event("WARN", "bounds-do-not-explain", text, now=now, step=last, about=about)]
         if not self._explained:
-            text = f"the bounds explain the data of steps {first} to {last}: {factor:.4g} of them would do"
+            text = f"the bounds explain the data of steps {first} to {last}: {factor:.4g} times these bounds suffice"
             return [self.event("INFO", "bounds-explain", text, now=now, step=last, about=about)]
         return []
 

@@ -1,8 +1,8 @@
 """How fast a source that is late may publish.
 
-After a time in which a whole machine stood still, links are gone for a moment, and all that a source publishes then
-must still be in its cache when they are back. A third of what it keeps goes out at once, then steps go out as they
-would in time, and once links have had time to come back, ``HURRY`` times as fast.
+After a standstill of the whole machine, links are broken for a moment. What a source publishes then must still be in
+its cache when the links are back. So it publishes a third of what its cache holds at once, then steps at the mesh's
+rate, and ``HURRY`` times as fast when the links have had time to come back.
 """
 
 from __future__ import annotations

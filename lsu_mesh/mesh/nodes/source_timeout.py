@@ -1,4 +1,4 @@
-"""Which sources of a node have fallen silent."""
+"""Which sources of a node have stopped sending."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STRANGE_SILENCE = 2 * SECOND
 
 
 class SourceTimeout(NamedTuple):
-    """Since when a source has said nothing, and the longest that it ever said nothing."""
+    """Since when a source has sent nothing, and its longest pause so far."""
 
     since: int
     longest: int = 0
@@ -24,12 +24,12 @@ class SourceTimeout(NamedTuple):
         return SourceTimeout(now, max(self.longest, now - self.since))
 
     def is_strange(self, now: int) -> bool:
-        """Whether it is silent for much longer than it ever was."""
+        """Whether the present pause is much longer than every one before."""
         return now - self.since > max(STRANGE_SILENCE, 4 * self.longest)
 
 
 class SourceTimeouts:
-    """The silences of all sources; one that was never heard is silent since the first of them was."""
+    """The pauses of all sources; that of one which has sent nothing yet begins with the first message of any."""
 
     def __init__(
         self, configuration: Configuration, subscriptions: Sequence[tuple[str, str]], sources: Collection[str]
@@ -40,12 +40,12 @@ class SourceTimeouts:
         self._first: int | None = None
 
     def received(self, source: str, now: int) -> None:
-        """A source has said something."""
+        """A message of a source has come."""
         self._first = now if self._first is None else self._first
         self._known[source] = self._known.get(source, SourceTimeout(now)).received(now)
 
     def complaints(self, now: int) -> list[Complaint]:
-        """One per source whose silence is strange."""
+        """One per source whose pause is strange."""
         if self._first is None:
             return []
         silent = [(address, self._known.get(name, SourceTimeout(self._first))) for name, address in self._keys.items()]

@@ -1,4 +1,4 @@
-"""The messages of a recording, found by the names that others call them."""
+"""The messages of a recording, found by reference (topic, src, boot, seq)."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Archive:
         return [message for message in self._messages.values() if isinstance(message, kind)]
 
     def of_step(self, name: str, step: int) -> list[Message]:
-        """What a sensor, a filter or a fusion said of a step."""
+        """The messages of a sensor, a filter or a fusion about a step."""
         return self._by_name.get((name, step), [])
 
     def newest(self, name: str, step: int, before_ns: int) -> Posterior | None:
@@ -69,7 +69,7 @@ class Archive:
         return reference in self._messages
 
     def sets(self) -> list[Posterior | Prediction]:
-        """Everything that claims to hold the state, in the order of arrival, but each after what it was made from.
+        """All published sets, in the order of arrival, but each after the sets that it was made from.
 
         Messages of one process on several keys may overtake one another on their way to the recorder.
         """
@@ -97,7 +97,7 @@ class Archive:
         return [other for other in found if isinstance(other, Posterior | Prediction)]
 
     def find(self, reference: Reference, kind: type[Kind]) -> Kind:
-        """The message that is called so. Raises :class:`Unverifiable` where it is not there."""
+        """The message of a reference. Raises :class:`Unverifiable` where it is not there."""
         topic, src, boot, seq = reference
         message = self._messages.get(reference)
         if message is None:

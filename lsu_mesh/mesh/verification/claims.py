@@ -1,4 +1,4 @@
-"""What sets say of themselves, proved: guarantee, descent, status, epoch, missing, rejected, quarantined, policy.
+"""The claims of sets, proved: guarantee, descent, status, epoch, missing, rejected, quarantined, policy.
 
 Each claim is recomputed from provenance, events and configuration. One that is false is named with its set; one that
 cannot be recomputed is counted by name, and nothing is concluded from it.
@@ -48,7 +48,7 @@ class Claims:
         self.unproved.update(unproved)
 
     def check_processes(self) -> None:
-        """What every process says in the course of its life."""
+        """Claims that need all messages of a process, in their order."""
         kinds = (Posterior, Prediction)
         sets = by_process(message for message in self._archive.messages(Message) if isinstance(message, kinds))
         events = by_process(self._archive.messages(Event))

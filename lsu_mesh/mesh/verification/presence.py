@@ -1,7 +1,7 @@
-"""Who was there at a step: missing, rejected and quarantined sources, recomputed from what was used and recorded.
+"""Which sources a step had: missing, rejected and quarantined ones, recomputed from provenance and recording.
 
-A source that was used was there. One that was neither used nor rejected nor missing must have sent something that
-says nothing. Whether the message of a missing source came late, or never, only the process itself can know: that is
+A source that was used was not missing. One that was neither used nor rejected nor missing must have sent a message
+without data. Whether the message of a missing source came late, or never, only the process itself can know: that is
 counted by name.
 """
 

@@ -11,7 +11,7 @@ from lsu_mesh.mesh.verification.process_events import ProcessEvents
 from lsu_mesh.mesh.verification.recompute import Recomputed
 
 Set = Posterior | Prediction
-EARLIER_LIFE = "epoch: of a process's first set, which goes on from an earlier life that is not in the recording"
+EARLIER_LIFE = "epoch: of a process's first set, which continues an earlier process that is not in the recording"
 GAP = "status: whether it is the first set since a start, because the recorder missed the one before"
 OTHER_NUMBER = "status: whether the data contradict a set of another algorithm"
 
@@ -72,7 +72,7 @@ class ProcessClaims:
     # -- status
 
     def _statuses(self, message: Posterior, recomputed: Recomputed | None, pending: bool | None) -> set[str]:
-        """What may be said of a set."""
+        """The statuses that a set may have."""
         if self._is_inconsistent(message):
             return {"inconsistent"}
         data = recomputed.status if recomputed is not None else self._data_status(message)

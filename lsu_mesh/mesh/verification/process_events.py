@@ -1,4 +1,4 @@
-"""What one process has told of its epochs, by its events."""
+"""The epochs of one process, as its events announce them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ProcessEvents:
             self._told.append((event, number))
 
     def told(self, message: Set) -> set[int]:
-        """Epochs that the process had told of by then."""
+        """Epochs that the process had announced by then."""
         return {number for event, number in self._told if _is_before(event, message)}
 
     def is_reset_by_data(self, message: Posterior) -> bool:
@@ -48,7 +48,7 @@ class ProcessEvents:
         return bool(before) and before[-1].code in ("epoch-lost", "prediction-dropped")
 
     def has_too_many_faults(self, message: Posterior) -> bool:
-        """Whether a fusion told of the message's step that more sources are wrong than may be."""
+        """Whether a fusion reported, for the message's step, that more sources are wrong than ``faults`` allows."""
         return any(event.step == message.step and _is_before(event, message) for event in self._too_many)
 
 
