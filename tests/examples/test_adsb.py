@@ -19,7 +19,7 @@ from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.messages import Event, Measurement, Posterior, encode
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from lsu_mesh.mesh.nodes.sensor import FileSensorNode
+from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 
 CELL = 25.0
 ROUNDING = 1e-9
