@@ -13,8 +13,8 @@ from lsu_mesh.simulation import flow_state, input_at, next_state, random_uniform
 class PlantCourse:
     """A function of (seed, name, step), so that plant and sensors know it without asking each other.
 
-    A continuous model is followed exactly, with noise that is constant within a step (:func:`flow_state`). Of a discrete
-    model nothing is known between steps: there the simulated state moves on a straight line.
+    A continuous model is followed exactly, with noise that is constant within a step (:func:`flow_state`). Of a
+    discrete model nothing is known between steps: there the simulated state moves on a straight line.
     """
 
     def __init__(self, configuration: Configuration) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from lsu_mesh.array_types import Flags, Integers, Vector
-from lsu_mesh.mesh.config.settings import Configuration, DataFileSettings
+from lsu_mesh.mesh.config.settings import Configuration, MeasurementFileSettings
 from lsu_mesh.mesh.data_files import DataFile, DataFileError, read
 from lsu_mesh.mesh.data_files.spans import duration_text
 
 
-def recorded_inputs(configuration: Configuration, settings: DataFileSettings) -> dict[int, Vector]:
+def recorded_inputs(configuration: Configuration, settings: MeasurementFileSettings) -> dict[int, Vector]:
     """u (p,) of each step that has a row without a missing value.
 
     An input acts from t_k on, so that a row belongs to the step that it begins: it has to lie on the grid, or at most
@@ -26,11 +26,8 @@ def recorded_inputs(configuration: Configuration, settings: DataFileSettings) ->
     if len(twice):
         line = int(data.lines[twice[0] + 1])
         step = int(steps[twice[0] + 1])
-        raise DataFileError(
-            [
-                f"{data.path}: line {line}: step {step} has an input already; a step is driven by one input: leave one row"
-            ]
-        )
+        text = f"line {line}: step {step} has an input already; a step is driven by one input: leave one row"
+        raise DataFileError([f"{data.path}: {text}"])
     known = inside & ~np.isnan(data.values).any(axis=1)
     return {int(k): u for k, u in zip(steps[known], data.values[known], strict=True)}
 
@@ -53,10 +50,9 @@ def _begun_steps(data: DataFile, configuration: Configuration) -> Integers:
 def _refuse_off_grid(data: DataFile, is_off: Flags, late: Integers) -> None:
     if is_off.any():
         i = int(np.argmax(is_off))
-        raise DataFileError(
-            [
-                f"{data.path}: line {data.lines[i]}: the input begins {duration_text(int(late[i]))} after a step "
-                f"({int(is_off.sum())} such rows); an input acts from the moment of a step on: number the rows by step, "
-                "choose start_time and dt that fit them, or declare input_delay of a continuous model"
-            ]
+        text = (
+            f"line {data.lines[i]}: the input begins {duration_text(int(late[i]))} after a step ({int(is_off.sum())} "
+            "such rows); an input acts from the moment of a step on: number the rows by step, choose start_time and dt "
+            "that fit them, or declare input_delay of a continuous model"
         )
+        raise DataFileError([f"{data.path}: {text}"])

@@ -30,10 +30,10 @@ class State(NamedTuple):
 
 
 class SimulatedSensorNode(Node):
-    """``y = C x + D u + d + v`` with v a function of (seed, name, index), and the faults of its configuration.
+    """``y = C x + D u + d + v`` with v a function of (seed, name, number), and the faults of its configuration.
 
-    It measures at every step, or at moments of its own (:class:`SensorClock`). The state between t_k and t_{k+1} is that
-    of :class:`PlantCourse` from the truth of step k on, and what was measured there is told with the next truth.
+    It measures at every step, or at moments of its own (:class:`SensorClock`). The state between t_k and t_{k+1} is
+    that of :class:`PlantCourse` from the truth of step k on, and what was measured there is told with the next truth.
     """
 
     role = "sensor"
@@ -113,19 +113,19 @@ class SimulatedSensorNode(Node):
         if self._course is not None:
             u = self._course.input(state.step)
             x = self._course.after(state.step, x, since) if since else x
-        unit = random_uniform(seed, f"{self.name}/noise", moment.index, model.output_count)
+        unit = random_uniform(seed, f"{self.name}/noise", moment.number, model.output_count)
         k = grid.step_of(moment.stamp_ns)
-        y = self._distorted(k, moment.index, measured(model, x, u, unit))
+        y = self._distorted(k, moment.number, measured(model, x, u, unit))
         fields = time_fields(grid, moment.stamp_ns, self._settings.time_error_ns)
         return Measurement(**self.stamp("measurement", k, now), y=listed(y), **fields)
 
-    def _distorted(self, k: int, index: int, y: Vector) -> Vector:
+    def _distorted(self, k: int, number: int, y: Vector) -> Vector:
         for fault in self._settings.faults:
             if fault.first <= k <= fault.last:
-                y = self._with_fault(fault, k, index, y=y)
+                y = self._with_fault(fault, k, number, y=y)
         return y
 
-    def _with_fault(self, fault: SensorFault, k: int, index: int, *, y: Vector) -> Vector:
+    def _with_fault(self, fault: SensorFault, k: int, number: int, *, y: Vector) -> Vector:
         match fault.kind:
             case "bias":
                 return y + fault.size
@@ -134,7 +134,7 @@ class SimulatedSensorNode(Node):
             case "stuck":
                 return self._stuck.setdefault(fault, y)
             case "random":
-                noise = random_uniform(self.configuration.mesh.seed, f"{self.name}/fault", index, len(y))
+                noise = random_uniform(self.configuration.mesh.seed, f"{self.name}/fault", number, len(y))
                 return y + fault.size * noise
             case "lost":
                 return np.full(len(y), math.nan)

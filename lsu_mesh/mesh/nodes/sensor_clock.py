@@ -12,13 +12,13 @@ from lsu_mesh.simulation import random_uniform
 class Moment(NamedTuple):
     """A measurement: its number, when it is made, and what the clock says; nanoseconds."""
 
-    index: int
+    number: int
     time_ns: int
     stamp_ns: int
 
 
 class SensorClock:
-    """Moments that are functions of (seed, name, index), the same after a restart.
+    """Moments that are functions of (seed, name, number), the same after a restart.
 
     Turn ``i`` is t_i of the grid, or ``t_0 + i every``. The true moment lies up to ``jitter`` after it, the stamp up to
     ``clock_error`` before or after the true moment, both uniform.
