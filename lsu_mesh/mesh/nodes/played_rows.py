@@ -10,6 +10,7 @@ from lsu_mesh.array_types import Integers, Vector
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.data_files import DataFile, read
 from lsu_mesh.mesh.data_files.account import Placement, place
+from lsu_mesh.mesh.nodes.time_fields import goes_to_nearest
 
 
 class PlayedRow(NamedTuple):
@@ -36,8 +37,9 @@ class PlayedRows:
         if configuration.continuous is None:
             given = settings.tolerance_ns
             tolerance = max(1, data.digit_ns // 2) if given is None else given
-        placed = place(data, grid, configuration.mesh.steps, nearest=False, tolerance_ns=tolerance)
-        kept = np.flatnonzero(placed.is_delivered)
+        last = configuration.mesh.steps
+        placed = place(data, grid, last, nearest=goes_to_nearest(configuration, settings), tolerance_ns=tolerance)
+        kept = np.flatnonzero(~placed.is_before & ~placed.is_after)
         steps = placed.steps[kept]
         self._values = data.values[kept]
         self._times, self._errors = _times(data, placed, tolerance, grid_times=grid.times_of(placed.steps))

@@ -15,7 +15,7 @@ from lsu_mesh.mesh.messages import Measurement, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.plant_course import PlantCourse
 from lsu_mesh.mesh.nodes.sensor_clock import Moment, SensorClock
-from lsu_mesh.mesh.nodes.time_fields import time_fields
+from lsu_mesh.mesh.nodes.time_fields import step_of, time_fields
 from lsu_mesh.simulation import measured, random_uniform
 
 REMEMBERED = 4096
@@ -114,7 +114,7 @@ class SimulatedSensorNode(Node):
             u = self._course.input(state.step)
             x = self._course.after(state.step, x, since) if since else x
         unit = random_uniform(seed, f"{self.name}/noise", moment.number, model.output_count)
-        k = grid.step_of(moment.stamp_ns)
+        k = step_of(self.configuration, self._settings, moment.stamp_ns)
         y = self._distorted(k, moment.number, measured(model, x, u, unit))
         fields = time_fields(grid, moment.stamp_ns, self._settings.time_error_ns)
         return Measurement(**self.stamp("measurement", k, now), y=listed(y), **fields)
