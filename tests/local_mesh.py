@@ -8,13 +8,14 @@ from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import TYPES, Event, Message, Posterior, Truth, encode
+from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.identifier import IdentifierNode
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from lsu_mesh.mesh.nodes.sensor import FileSensorNode, SimulatedSensorNode
+from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
 
 Carry = Callable[[str, bytes, Node], bool]
 MILLISECOND = 1_000_000

@@ -28,6 +28,11 @@ class Access(NamedTuple):
     answers: tuple[str, ...]
 
 
+def truth_is_known(configuration: Configuration) -> bool:
+    """Whether the plant tells its state: a sensor is simulated on it. Real measurements come without a truth."""
+    return configuration.plant is not None and any(one.file is None for one in configuration.sensors.values())
+
+
 def subscriptions(configuration: Configuration, role: str, name: str) -> list[tuple[str, str]]:
     """``(topic, name)`` of everything that a node listens to."""
     if role == "sensor":

@@ -17,9 +17,9 @@ from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.fusion.fuse import fuse
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.messages import Event, Measurement, Posterior, encode
+from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from lsu_mesh.mesh.nodes.sensor import FileSensorNode
 
 CELL = 25.0
 ROUNDING = 1e-9

@@ -60,6 +60,8 @@ class Node(ABC):
     """Topics that the node publishes, besides health and events."""
     takes_at_once: ClassVar[int] = 2048
     """Messages that the service around the node hands over before the next tick, however many more are waiting."""
+    messages_per_step: int = 1
+    """Messages of a step under one key at most, as far as the node knows."""
     answers: ClassVar[tuple[str, ...]] = ()
     """Topics that come as answers to the node's queries, besides its subscriptions."""
 

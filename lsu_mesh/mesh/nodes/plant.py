@@ -1,21 +1,17 @@
-"""A simulated plant: publishes the true state and the input of every step."""
+"""A plant: publishes the input of every step, and the true state where it is simulated."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from lsu_mesh.array_types import Vector
-from lsu_mesh.mesh.access import PUBLISHES
-from lsu_mesh.mesh.config.measurement_files import read_playback
+from lsu_mesh.mesh.access import PUBLISHES, truth_is_known
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Input, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.nodes.plant_course import PlantCourse
 from lsu_mesh.mesh.nodes.rate_limit import RateLimit
 from lsu_mesh.mesh.nodes.schedule import MAX_AT_ONCE, Schedule
-from lsu_mesh.simulation import input_at, next_state, random_uniform
 
 PAST_SECONDS, LEAST_PAST = 30.0, 256
 """So much of the past, and so many steps, a plant that starts late publishes the inputs of: filters need every one."""
@@ -26,9 +22,10 @@ SILENT_AT_ONCE = 20_000
 
 
 class PlantNode(Node):
-    """``x⁺ = A x + B u + N w`` with noise and inputs that are functions of (seed, name, step).
+    """The state and the inputs of :class:`PlantCourse`, step by step.
 
-    A plant that is started again is at the current step at once, with the same values.
+    Where no sensor is simulated there is no truth: then the inputs alone are published, and of a recording only those
+    that it has. A plant that is started again is at the current step at once, with the same values.
     """
 
     role = "plant"
@@ -36,32 +33,26 @@ class PlantNode(Node):
 
     def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
         super().__init__(configuration, name, boot)
-        assert configuration.plant is not None
-        self._settings = configuration.plant
+        self._course = PlantCourse(configuration)
+        self._tells_truth = truth_is_known(configuration)
         self._schedule = schedule
         self._pace = RateLimit(configuration.mesh.rate, configuration.cached)
-        self._model = configuration.base_model
-        self._last = configuration.mesh.steps
+        self._last = min((end for end in (configuration.mesh.steps, self._course.end) if end is not None), default=None)
         self._next = 1
         self._not_before = 0
         """When the next burst of past inputs may go out."""
         self._past: range | None = None
         """Steps whose inputs alone are published, because they are over; known with the first tick."""
-        self._x: Vector = np.array(
-            self._settings.x1 if self._settings.x1 is not None else configuration.prior.center, dtype=np.float64
-        )
-        self._file: dict[int, Vector] | None = None
-        if self._settings.file is not None:
-            played = read_playback(self._settings.file, configuration.mesh.dt, configuration.mesh.start_time)
-            self._file = dict(zip(played.steps.tolist(), played.values, strict=True))
-            end = int(played.steps[-1]) if len(played.steps) else 0
-            self._last = end if self._last is None else min(self._last, end)
+        self._x = self._course.first
+        self._missing = 0
+        """Inputs that a recording does not have, and that nobody knows."""
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return ()
 
     def warm_up(self) -> None:
-        next_state(self._model, self._x, np.zeros(self._model.input_count), np.zeros(self._model.rho.size))
+        if self._tells_truth:
+            self._course.next(1, self._x)
 
     def receive(self, message: Message, now: int) -> list[Message]:
         return []
@@ -79,7 +70,8 @@ class PlantNode(Node):
         steps = self._pace.take(min(MAX_AT_ONCE, due + 1 - self._next), now)
         messages: list[Message] = []
         for k in range(self._next, self._next + steps):
-            messages.append(Truth(**self.stamp("truth", k, now), x=self._x.tolist()))
+            if self._tells_truth:
+                messages.append(Truth(**self.stamp("truth", k, now), x=self._x.tolist()))
             messages += self._drive(k, now, publish=True)
         return messages
 
@@ -105,20 +97,25 @@ class PlantNode(Node):
 
     def _drive(self, k: int, now: int, *, publish: bool) -> list[Message]:
         """One time update of the truth; the input's message."""
-        u = self._input(k)
-        unit = random_uniform(self.configuration.mesh.seed, f"{self.name}/process", k, self._model.rho.size)
-        self._x = next_state(self._model, self._x, u, unit)
+        if self._tells_truth:
+            self._x = self._course.next(k, self._x)
         self._next = k + 1
-        if not publish or not self._model.input_count:
+        if not publish or not self.configuration.base_model.input_count:
             return []
-        return [Input(**self.stamp("input", k, now), u=u.tolist())]
+        if not self._tells_truth and not self._course.is_known(k):
+            return self._told_missing(k, now)
+        return [Input(**self.stamp("input", k, now), u=self._course.input(k).tolist())]
 
-    def _input(self, k: int) -> Vector:
-        if self._file is not None:
-            u = self._file.get(k)
-            return np.zeros(self._model.input_count) if u is None or np.isnan(u).any() else u
-        size = self._model.input_count
-        return input_at(self._settings.inputs, self.configuration.mesh.seed, k, size=size, name=f"{self.name}/input")
+    def _told_missing(self, k: int, now: int) -> list[Message]:
+        """An input that nobody knows is not made up; the first one is told."""
+        self._missing += 1
+        if self._missing > 1:
+            return []
+        text = f"the recording has no input of step {k}; filters need it, or [model.input_box]"
+        return [self.event("WARN", "input-missing", text, now=now, step=k, about={"step": k})]
+
+    def counters(self) -> dict[str, float]:
+        return {"missing inputs": float(self._missing)} if self._missing else {}
 
     def wakeup(self) -> int | None:
         due = None if self.finished else self._schedule.time_of(self._next)

@@ -60,7 +60,8 @@ class Invariants:
             for settings in configuration.filters.values()
         )
         self._lives: dict[str, Life] = {}
-        self._values: dict[tuple[str, str, int], list[float] | list[float | None]] = {}
+        self._values: dict[tuple[str, str, int, int], list[float] | list[float | None]] = {}
+        """What was said first, by topic, name, step and time."""
         self._provenance = Provenance(configuration)
         self._recomputation = Recomputation(configuration)
         self._published: dict[tuple[str, str], set[int]] = {}
@@ -100,7 +101,7 @@ class Invariants:
         elif isinstance(message, Input):
             self._check_same(message, message.u)
         elif isinstance(message, Measurement):
-            self._check_same(message, message.y)
+            self._check_same(message, message.y, message.time_ns)
         elif isinstance(message, Event) and (message.level == "ERROR" or message.code in FALSE_ALARMS):
             raise InvariantBroken("false alarm", f"{message.src} says {message.code}: {message.text}")
         elif isinstance(message, Health):
@@ -123,9 +124,9 @@ class Invariants:
         life.sequences[message.topic] = expected + 1
         self._published.setdefault((f"{message.topic}/{message.name}", message.boot), set()).add(message.seq)
 
-    def _check_same(self, message: Message, values: list[float] | list[float | None]) -> None:
-        """A step has one truth, one input, and one measurement of each sensor, restarts or not."""
-        first = self._values.setdefault((message.topic, message.name, message.step), values)
+    def _check_same(self, message: Message, values: list[float] | list[float | None], time_ns: int = 0) -> None:
+        """A step has one truth and one input, a moment one measurement of each sensor, restarts or not."""
+        first = self._values.setdefault((message.topic, message.name, message.step, time_ns), values)
         if first != values:
             text = f"{message.src} sent step {message.step} as {values}, before as {first}"
             raise InvariantBroken("restart", text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from lsu_mesh.mesh.admission import ROLE_OF_TOPIC
 from lsu_mesh.mesh.config.settings import Configuration
@@ -16,6 +16,11 @@ class Provenance:
     def __init__(self, configuration: Configuration) -> None:
         self._steps: dict[Reference, int] = {}
         self._roles = {name: role for role, name in configuration.peers()}
+        self._acts_late = configuration.input_delay_ns > 0
+        self._sees_inputs = configuration.base_model.input_count > 0 and (
+            configuration.input_delay_ns > 0
+            or any(one.D or one.time_error_ns for one in configuration.sensors.values())
+        )
         self._every_input = configuration.base_model.input_count > 0 and configuration.input_box is None
 
     def role_of(self, topic: str, name: str) -> str:
@@ -31,13 +36,15 @@ class Provenance:
         """Walk from the base to the step of the set; ``taken``: everything that its maker ever took."""
         where = f"{message.src} step {message.step} revision {message.revision}"
         step = self._base_step(message, taken, where)
-        once = [reference for reference in message.used if reference[0] != "fused"]  # a box may be carried on again
+        again = ("fused", "input") if self._sees_inputs else ("fused",)  # a box may be carried on again
+        once = [reference for reference in message.used if reference[0] not in again]
         if len(set(once)) != len(once):
             raise InvariantBroken("provenance", f"{where}: something was used twice: {message.used}")
-        for reference in message.used:
+        for i, reference in enumerate(message.used):
             if reference not in taken:
                 raise InvariantBroken("provenance", f"{where}: used {reference}, which it never took")
-            step = self._walked(step, reference, where)
+            if not (self._sees_inputs and self._is_only_seen(message.used, i, step)):
+                step = self._walked(step, reference, where)
         if (self._every_input and step != message.step) or step > message.step:
             raise InvariantBroken("provenance", f"{where}: reaches step {step}: {message.base} {message.used}")
 
@@ -51,6 +58,21 @@ class Provenance:
         if base not in self._steps or (not is_own and base not in taken):
             raise InvariantBroken("provenance", f"{where}: made from {base}, which it never had")
         return self._steps[base]
+
+    def _is_only_seen(self, used: Sequence[Reference], i: int, step: int) -> bool:
+        """Whether an input is listed because data see it, or because it acts till the next one does: it drives nothing.
+
+        It stands before the data that see it, and is of their step, or of one that is over. Where inputs act late, that
+        of the step before stands before the next one, or before the box that is in its place.
+        """
+        if used[i][0] != "input":
+            return False
+        own = self._steps[used[i]]
+        if self._acts_late and own == step - 1:
+            return True
+        data = (self._steps[other] for other in used[i + 1 :] if other[0] in ("measurement", "prediction"))
+        upcoming = next(data, None)
+        return upcoming is not None and (own < step or own >= upcoming)
 
     def _walked(self, step: int, reference: Reference, where: str) -> int:
         """The step after one more used message."""

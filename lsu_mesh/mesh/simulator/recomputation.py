@@ -1,6 +1,7 @@
 """Whether a measurement that came late is in the set of its step: the set is computed again without the node.
 
-Only for filters whose message holds all that they know (orthotopes and parallelotopes) and that take no transfers.
+Only for filters whose message holds all that they know (orthotopes and parallelotopes) and that take no transfers, in a
+mesh of one model whose data are of the grid.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ class Recomputation:
         self._watched = {
             name
             for name, settings in configuration.filters.items()
-            if settings.kind in KINDS and settings.transfer == "off"
+            if settings.kind in KINDS and settings.transfer == "off" and _is_plain(configuration)
         }
 
     def admitted(self, node: Node, message: Message) -> None:
@@ -80,3 +81,11 @@ class Recomputation:
         if not np.isnan(y).all():
             engine.update(y)
         return engine
+
+
+def _is_plain(configuration: Configuration) -> bool:
+    """Whether a step is one time update by one model and one data update."""
+    sensors = configuration.sensors.values()
+    return configuration.has_one_model and not any(
+        one.D or one.offset or one.period or one.every_ns or one.jitter_ns or one.time_error_ns for one in sensors
+    )

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Posterior
+from lsu_mesh.mesh.nodes.plant_course import PlantCourse
 from lsu_mesh.mesh.simulator.broken import InvariantBroken
 from lsu_mesh.mesh.simulator.faults import FaultPlan, draw_plan
 from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.mesh import SimulatedMesh
+from lsu_mesh.mesh.simulator.time_variants import draw_times
 from lsu_mesh.mesh.simulator.variants import Variant, configured, draw_variant
-from lsu_mesh.simulation import input_at, next_state, random_uniform
 
 TRAJECTORIES = 4
 """So many different trajectories of the plant; the fault-free run of each is kept."""
@@ -54,6 +55,8 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
     rng = random.Random(seed)
     base = configured(file, steps, 0, Variant())
     variant = draw_variant(rng, base)
+    if variant.kinds:
+        variant = variant._replace(times=draw_times(random.Random(f"{seed}/times"), base))
     trajectory = rng.randrange(TRAJECTORIES)
     configuration = configured(file, steps, trajectory, variant)
     witness = Invariants(configuration, true_states(configuration, steps + AFTERMATH))
@@ -89,14 +92,12 @@ def fault_free_widths(file: Path, steps: int, trajectory: int, variant: Variant)
 
 def true_states(configuration: Configuration, steps: int) -> NDArray[np.float64]:
     """What the plant of a configuration does, (steps, n)."""
-    plant, model, seed = configuration.plant, configuration.base_model, configuration.mesh.seed
-    assert plant is not None
-    x = np.array(plant.x1 if plant.x1 is not None else configuration.prior.center, dtype=np.float64)
-    X = np.empty((steps, model.state_count))
+    course = PlantCourse(configuration)
+    x = course.first
+    X = np.empty((steps, x.size))
     for k in range(1, steps + 1):
         X[k - 1] = x
-        u = input_at(plant.inputs, seed, k, size=model.input_count, name=f"{plant.name}/input")
-        x = next_state(model, x, u, random_uniform(seed, f"{plant.name}/process", k, model.rho.size))
+        x = course.next(k, x)
     return X
 
 

@@ -16,7 +16,8 @@ from typing import Any, NamedTuple
 
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config import Configuration, load
-from lsu_mesh.mesh.config.settings import FilterSettings, TransferWay
+from lsu_mesh.mesh.config.settings import FilterSettings, ScheduledModel, TransferWay
+from lsu_mesh.mesh.simulator.time_variants import timed, with_flow
 from lsu_mesh.supports.orthotope import Orthotope
 
 RATE = 20.0
@@ -40,11 +41,13 @@ class Variant(NamedTuple):
     """A filter and the way in which it takes transfers."""
     extra: str = ""
     """``domain`` or ``input_box``."""
+    times: str = ""
+    """How models and sensors go by time, a name of :data:`lsu_mesh.mesh.simulator.time_variants.TIMES`."""
 
     def __str__(self) -> str:
         words = [f"{name}={kind}" for name, kind in self.kinds]
         words += [f"{self.transfer[0]}.transfer={self.transfer[1]}"] if self.transfer[0] else []
-        return " ".join([*words, self.extra]).strip() or "as it is"
+        return " ".join([*words, *filter(None, (self.extra, self.times))]) or "as it is"
 
 
 def draw_variant(rng: random.Random, base: Configuration) -> Variant:
@@ -87,7 +90,7 @@ def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Conf
         if senders:
             filters[name] = replace(filters[name], transfer=way, transfer_from=tuple(sorted(senders)))
     fusion = {name: replace(settings, **small) for name, settings in base.fusion.items()}
-    return _extended(replace(base, filters=filters, fusion=fusion), variant.extra)
+    return _extended(timed(replace(base, filters=filters, fusion=fusion), variant.times), variant.extra)
 
 
 def _of_kind(settings: FilterSettings, kind: str, small: Mapping[str, Any]) -> FilterSettings:
@@ -102,7 +105,14 @@ def _extended(configuration: Configuration, extra: str) -> Configuration:
     n, p = model.state_count, model.input_count
     if extra == "domain" and model.domain is None:
         box = Orthotope([-DOMAIN] * n, [DOMAIN] * n)
-        return replace(configuration, base_model=model.replace(domain=box))
+        flow = configuration.continuous
+        if flow is None:
+            return replace(configuration, base_model=model.replace(domain=box), schedule=_within(configuration, box))
+        return with_flow(configuration, flow.replace(domain=box))
     if extra == "input_box" and p and configuration.input_box is None:
         return replace(configuration, input_box=Orthotope([-INPUTS] * p, [INPUTS] * p))
     return configuration
+
+
+def _within(configuration: Configuration, box: Orthotope) -> tuple[ScheduledModel, ...]:
+    return tuple(replace(entry, model=entry.model.replace(domain=box)) for entry in configuration.schedule)

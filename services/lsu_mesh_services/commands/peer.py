@@ -71,10 +71,12 @@ def make_node(configuration: Configuration, options: argparse.Namespace) -> Node
             from lsu_mesh.mesh.nodes.plant import PlantNode
 
             return PlantNode(configuration, name, boot, schedule)
-        from lsu_mesh.mesh.nodes.sensor import FileSensorNode, SimulatedSensorNode
-
         if configuration.sensors[name].file is not None:
+            from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
+
             return FileSensorNode(configuration, name, boot, schedule)
+        from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
+
         return SimulatedSensorNode(configuration, name, boot)
     if options.role == "filter":
         from lsu_mesh.mesh.nodes.filter import FilterNode

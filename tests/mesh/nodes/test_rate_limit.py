@@ -9,11 +9,11 @@ import pytest
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Measurement, Truth
+from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.plant import PlantNode
 from lsu_mesh.mesh.nodes.rate_limit import HURRY, SETTLING_NS, RateLimit
 from lsu_mesh.mesh.nodes.schedule import Schedule
-from lsu_mesh.mesh.nodes.sensor import FileSensorNode
 
 RATE, KEPT = 50.0, 300
 BACK_S = 1.5

@@ -142,13 +142,13 @@ def test_a_fault_acts_from_its_first_to_its_last_step(
 
 def test_a_file_is_played_by_its_times_and_holes_are_missing(mesh_of: MakeMesh, tmp_path: Path) -> None:
     (tmp_path / "mesh.toml").write_text(FILE_MESH)
-    (tmp_path / "gauge.csv").write_text("t,height\n100.5,1.0\n101.02,\n102.5,1.5\n102.6,7\n99,3\n")
+    (tmp_path / "gauge.csv").write_text("t,height\n100.5,1.0\n101.0,\n102.5,1.5\n99,3\n")
     mesh = mesh_of(file=tmp_path / "mesh.toml")
     mesh.run(5.0, tick_ms=50)
     played = {m.step: m.y[0] for m in mesh.of(Measurement)}
     assert played == {1: 1.0, 2: None, 3: None, 4: None, 5: 1.5}
     assert mesh.nodes["gauge"].finished
-    (event,) = mesh.events("rows-share-a-step")
+    (event,) = mesh.events("rows-before-the-prior")
     assert event.about["rows"] == 1
     newest = mesh.newest("box")
     assert [newest[k].status for k in range(1, 6)] == ["ok", "predicted", "predicted", "predicted", "ok"]
