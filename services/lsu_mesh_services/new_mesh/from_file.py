@@ -45,8 +45,8 @@ def _model(found: Survey) -> str:
     upper = [number for center, half, speed in prior for number in (center + half, speed)]
     return "\n".join(
         [
-            "# Position and speed of each column, dx/dt = A x + noise_map w; w is the acceleration, at most rho at every",
-            "# moment. In continuous time every row is used at its own moment, wherever the steps are.",
+            "# Position and speed of each column, dx/dt = A x + noise_map w; w is the acceleration, at most rho at",
+            "# every moment. In continuous time every row is used at its own moment, wherever the steps are.",
             "[model]",
             "continuous = true",
             f"A = {_blocks([[0.0, 1.0], [0.0, 0.0]], count)}",
@@ -70,7 +70,7 @@ def _sensor(found: Survey, target: Path) -> str:
         [
             "[sensors.data]",
             f"C = {_matrix(rows)}",
-            "# half-widths of the noise: half the smallest step between two values, so rounding alone;",
+            "# half-widths of the noise: half the resolution of the values, so rounding alone;",
             "# a sensor errs by more than that: take its data sheet",
             f"r = {_list([_half_width(found, i) for i in range(len(found.columns))])}",
             f"file = {_text(_relative(found.path, target))}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -42,7 +43,7 @@ class Survey:
     """One period before the first time."""
     dt: Fraction
     resolution: tuple[float, ...]
-    """The smallest step between two values; 0 where all are alike."""
+    """The largest number of which all differences of values are multiples; 0 where all are alike."""
     first: tuple[float, ...]
     largest_speed: tuple[float, ...]
     """|difference| of neighbours, per second."""
@@ -132,8 +133,12 @@ def _seconds(data: DataFile, dt: Fraction) -> NDArray[np.float64]:
 
 
 def _resolution(values: NDArray[np.float64]) -> float:
+    """The largest q of which all differences of values are multiples, as decimals: .001, or 25; 0 for one value."""
     distinct = np.unique(values[~np.isnan(values)])
-    return float(f"{np.diff(distinct).min():.6g}") if len(distinct) > 1 else 0.0
+    exact = [Fraction(repr(value)) for value in distinct.tolist()]
+    scale = math.lcm(*(value.denominator for value in exact))
+    whole = [int(value * scale) for value in exact]
+    return math.gcd(*(one - whole[0] for one in whole[1:])) / scale if len(whole) > 1 else 0.0
 
 
 def _first(values: NDArray[np.float64]) -> float:

@@ -64,7 +64,10 @@ def test_bounds_come_from_the_data(tmp_path: Path) -> None:
     written = new(tmp_path, "--from", "file", str(data(tmp_path, "time,height,who", SECONDS, HEIGHTS, ["Ada"] * ROWS)))
     configuration = load(written)
     sensor = configuration.sensors["data"]
-    assert sensor.r == (min(np.diff(np.unique(np.array(HEIGHTS, dtype=float)))).round(6) / 2,)
+    hundredths = [round(100 * float(height)) for height in HEIGHTS]
+    steps = range(1, max(hundredths) - min(hundredths) + 1)
+    largest = max(q for q in steps if all((one - hundredths[0]) % q == 0 for one in hundredths))
+    assert sensor.r == (largest / 100 / 2,)
     assert sensor.outputs == ("height",)
     assert "# not used, because they hold no numbers: who" in written.read_text()
     assert configuration.continuous is not None
