@@ -79,7 +79,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [
-        ("problem", "toml_lines", "write", "measurement_files"),
+        ("problem", "toml_lines", "write", "measurement_files", "digest"),
         ("expected", "settings"),
         ("table",),
         (REST,),

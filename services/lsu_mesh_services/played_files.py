@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.measurement_files import accounts
+from lsu_mesh.mesh.config.problem import DataProblem, data_doubt
 from lsu_mesh.mesh.data_files import DataFileError
 from lsu_mesh.mesh.data_files.account import Account
 
@@ -43,9 +45,14 @@ def as_records(found: Accounts) -> dict[str, dict[str, Any]]:
 
 def account_warnings(found: Accounts) -> list[str]:
     """One line per doubt."""
+    return [str(record) for record in warning_records(found)]
+
+
+def warning_records(found: Accounts) -> list[DataProblem]:
+    """The same with the table that names the file, for programs."""
     return [
-        f"{one.path}: warning: {text.removeprefix(f'{one.path}: ')}"
-        for one in found.values()
+        data_doubt(table, Path(one.path), text.removeprefix(f"{one.path}: "))
+        for table, one in found.items()
         for text in one.warnings()
     ]
 

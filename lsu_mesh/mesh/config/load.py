@@ -17,7 +17,7 @@ from lsu_mesh.mesh.config.exact_times import keep_digits, spell_out_dates
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.filters import kind_of, read_filter
 from lsu_mesh.mesh.config.fusion import check_learning, read_fusion, read_identifier, shared_sensor_warnings
-from lsu_mesh.mesh.config.mesh_table import grid_of_table, read_mesh
+from lsu_mesh.mesh.config.mesh_table import START_TIME, grid_of_table, read_mesh
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
 from lsu_mesh.mesh.config.overrides import apply, from_environment, from_flags
 from lsu_mesh.mesh.config.problem import ConfigurationError, Problem, Problems
@@ -152,9 +152,10 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     ]
     _check_names(names, problems)
     check_reserved(network, names, problems)
-    if any(s.file and s.file.indexed_by == "time" for s in sensors.values()) and mesh.start_time is None:
-        text = "is missing; files with a time column need it: step = (t − start_time)/dt"
-        problems.add("mesh", "start_time", text, expected="a finite number, in seconds since 1970")
+    files = [*(sensor.file for sensor in sensors.values()), None if plant is None else plant.file]
+    if any(file is not None and file.indexed_by == "time" for file in files) and mesh.start_ns is None:
+        text = "is missing; files with a time column need it: step k is at start_time + k dt"
+        problems.add("mesh", "start_time", text, expected=START_TIME.words)
     if model is None or prior is None:
         if not problems.records:
             problems.add("model", "", "no model could be made", expected="A, rho and [model.prior]")

@@ -83,6 +83,14 @@ def data_problem(table: str, path: Path, words: str) -> DataProblem:
     )
 
 
+def data_doubt(table: str, path: Path, text: str) -> DataProblem:
+    """What is doubtful about a file of measurements as a whole."""
+    words, expected = f"{path}: warning: {text}", "a file of which every row is used at its own moment"
+    return DataProblem(
+        file=str(path), table=table, key="file", text=text, expected=expected, is_warning=True, words=words
+    )
+
+
 class ConfigurationError(LsuMeshError):
     """A configuration is wrong.
 

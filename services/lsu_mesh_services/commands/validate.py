@@ -17,7 +17,7 @@ from lsu_mesh.mesh.config.step_noise import noise_of_one_dt
 from lsu_mesh_services.configuration import print_problems
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.network.security import missing_files
-from lsu_mesh_services.played_files import account_warnings, as_records, explained
+from lsu_mesh_services.played_files import as_records, explained, warning_records
 
 
 def main(options: argparse.Namespace) -> int:
@@ -38,13 +38,12 @@ def main(options: argparse.Namespace) -> int:
             print(explained(error), file=sys.stderr)
         return USAGE
     warnings = [*configuration.warnings, *missing_files(configuration)]
-    doubts = account_warnings(played)
+    doubts = warning_records(played)
     if options.json:
-        records = [{"level": "warning", "file": str(configuration.path), "text": text} for text in doubts]
         summary = _summary(configuration, len(warnings) + len(doubts)) | {"files": as_records(played)}
         noises = [noise.as_record() for noise in noise_of_one_dt(configuration)]
         summary |= {"noise_of_one_dt": noises} if noises else {}
-        _print_lines([*(warning.as_record() for warning in warnings), *records, summary])
+        _print_lines([*(warning.as_record() for warning in (*warnings, *doubts)), summary])
         return OK
     peers = [f"{role} {name}" for role, name in configuration.peers()]
     fine = f"{options.file}: fine; mesh {configuration.mesh.name!r} with {len(peers)} peers: {', '.join(peers)}"

@@ -45,8 +45,8 @@ def _model(found: Survey) -> str:
     upper = [number for center, half, speed in prior for number in (center + half, speed)]
     return "\n".join(
         [
-            "# Position and speed of each column, dx/dt = A x + noise_map w; w is the acceleration, at most rho at",
-            "# every moment. In continuous time every row is used at its own moment, wherever the steps are.",
+            "# Position and speed of each column, dx/dt = A x + noise_map w. w is the acceleration, at most rho at",
+            "# every moment. So each row is used at its own moment, wherever the steps are.",
             "[model]",
             "continuous = true",
             f"A = {_blocks([[0.0, 1.0], [0.0, 0.0]], count)}",

@@ -138,7 +138,7 @@ def test_a_missing_column_is_told_with_those_that_are_there(tmp_path: Path, demo
 def test_a_file_by_time_needs_a_start_time(tmp_path: Path, demo: Path) -> None:
     found = with_file(tmp_path, demo, "t,y\n1,0.5\n", 'time = "t"')
     assert found == [
-        "mesh.toml: [mesh] start_time: is missing; files with a time column need it: step = (t − start_time)/dt"
+        "mesh.toml: [mesh] start_time: is missing; files with a time column need it: step k is at start_time + k dt"
     ]
 
 

@@ -206,14 +206,23 @@ rho = [0.1, 0.2]
         assert [entry.first for entry in again.schedule] == [4, 10, 20]
 
 
+BETWEEN = (
+    "is 60 ms before step 11 at 101.1 s; a model changes at a step: take that moment, or from = 11, or a dt that has "
+    "a step there"
+)
+NO_SPAN = (
+    'expected a duration such as "5ms" or "200us", or a number of seconds, found 5e-10; it is no whole number of '
+    "nanoseconds"
+)
+
+
 @pytest.mark.parametrize(
     ("entries", "words"),
     [
         ("{ from = 1, rho = [1.0] }", "[model.schedule[0]] from: expected a step ≥ 2, or a moment on the grid"),
         ("{ from = 100.05, rho = [1.0] }",
          "[model.schedule[0]] from: is 50 ms before step 1 at 100.1 s; a model changes at a step: take that moment"),
-        ("{ from = 101.04, rho = [1.0] }", ("[model.schedule[0]] from: is 60 ms before step 11 at 101.1 s; a model "
-         "changes at a step: take that moment, or from = 11, or a dt that has a step there")),
+        ("{ from = 101.04, rho = [1.0] }", f"[model.schedule[0]] from: {BETWEEN}"),
         ("{ from = 5 }", "[model.schedule[0]]: changes nothing; give one of A, B, offset, noise_map, rho"),
         ("{ from = 5, rho = [1.0, 2.0] }", "[model.schedule[0]] rho: must have 1 entries, one per process noise"),
         ("{ from = 5, offset = [1.0] }", "[model.schedule[0]] offset: must have 2 entries, one per state"),
@@ -258,8 +267,7 @@ NO_STEPS = "puts its measurements off the grid, and a discrete model knows nothi
         ("", "offset = [1.0]", "offset: expected 2 numbers, one per row of C, found 1"),
         ("", "period = [360.0, -1.0]", "period: expected periods ≥ 0 (0: none), found [360.0, -1.0]"),
         ("", "rate = [1.0, -1.0]", "rate: expected bounds ≥ 0 of |dy/dt|, per second, found [1.0, -1.0]"),
-        ("", "time_error = 5e-10", ("time_error: expected a duration such as \"5ms\" or \"200us\", or a number of "
-         "seconds, found 5e-10; it is no whole number of nanoseconds")),
+        ("", "time_error = 5e-10", f"time_error: {NO_SPAN}"),
         ("", 'time_error = "5 hours"', "time_error: expected a duration such as"),
         ("", "every = 0", "every: expected a duration of at least 1 ns such as"),
         ("", 'off_grid = "nearst"', 'off_grid: "nearst" is no choice; did you mean "nearest"?'),
