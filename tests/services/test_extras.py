@@ -29,7 +29,16 @@ NEEDS = (
         "bench recording",
     )),
 )  # fmt: skip
-NONE = ("validate m.toml", "simulate", "identify m.toml", "doctor", "graph", "reproduce p2006", "bench kernels")
+NONE = (
+    "validate m.toml",
+    "simulate",
+    "identify m.toml",
+    "doctor",
+    "graph",
+    "reproduce p2006",
+    "bench kernels",
+    "new m.toml",
+)
 SENSOR = """
 [mesh]
 name = "files"

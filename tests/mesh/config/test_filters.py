@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal
 
 import pytest
 
@@ -15,8 +15,6 @@ from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.filters.registry import FILTERS
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, Problem, filters, load, load_values
 from lsu_mesh.mesh.config.filter_options import FilterOptions
-from lsu_mesh.mesh.config.fusion import POLICIES
-from lsu_mesh.mesh.messages import Fused
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -121,13 +119,13 @@ def test_a_mistake_elsewhere_does_not_hide_one_of_the_constructor(demo: Path) ->
 
 
 def test_the_old_name_of_a_key_is_read(demo: Path) -> None:
-    assert load(demo, ["filters.box.on_inconsistency=widen"]).filters["box"].on_inconsistency == "widen"
-    (one,) = records(demo, "filters.box.on_inconsistency=wide").values()
+    assert load(demo, ["filters.box.on_contradiction=widen"]).filters["box"].on_inconsistency == "widen"
+    (one,) = records(demo, "filters.box.on_contradiction=wide").values()
     assert (one.key, one.nearest) == ("on_contradiction", "widen")
 
 
 def with_old_key(demo: Path) -> Configuration:
-    return load(demo, ["filters.box.on_inconsistency=hold"])
+    return load(demo, ["filters.box.on_contradiction=hold"])
 
 
 def test_a_recording_that_holds_the_old_name_is_read_and_a_flag_beats_it(demo: Path) -> None:
@@ -145,7 +143,3 @@ def test_both_names_of_a_key_are_a_mistake(demo: Path, tmp_path: Path) -> None:
     (one,) = records(file).values()
     assert one.key == "on_contradiction"
     assert "old name of on_inconsistency" in one.text
-
-
-def test_the_policies_are_those_that_a_message_can_say() -> None:
-    assert set(POLICIES) == set(get_args(get_type_hints(Fused)["policy"]))
