@@ -136,13 +136,21 @@ class LSUModel:
 
     @classmethod
     def continuous(
-        cls, A: ArrayLike, B: ArrayLike | None, C: ArrayLike, rho: ArrayLike, r: ArrayLike, **options: Any
+        cls,
+        A: ArrayLike,
+        B: ArrayLike | None,
+        C: ArrayLike,
+        rho: ArrayLike,
+        r: ArrayLike,
+        noise_map: ArrayLike | None = None,
+        domain: Orthotope | tuple[ArrayLike, ArrayLike] | None = None,
+        **options: Any,
     ) -> ContinuousModel:
         """``ẋ = A x + B u + a + N w(t)``, ``|w(t)| ≤ rho`` at every moment, in seconds; arguments as of the class.
 
         rho is a *rate*: state units per second through N. See :class:`ContinuousModel`.
         """
-        return ContinuousModel(cls(A, B, C, rho=rho, r=r, **options))
+        return ContinuousModel(cls(A, B, C, rho=rho, r=r, noise_map=noise_map, domain=domain, **options))
 
     @property
     def state_count(self) -> int:

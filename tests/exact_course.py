@@ -7,10 +7,10 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from exact_plant import Exact
 
 from lsu_mesh import LSUModel, Orthotope
 from lsu_mesh.model import ContinuousModel
+from lsu_mesh.testing.exact_plant import Exact
 
 SECOND = 10**9
 

@@ -14,16 +14,18 @@ import numpy as np
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.held_set import HeldSet
 from lsu_mesh.mesh.estimation.step_record import Combined, Step, published_content
+from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.timeline import Timeline
 from lsu_mesh.mesh.estimation.warm_up import warm_up
-from lsu_mesh.mesh.messages import Base, Bounds, Input, Message, Posterior, Reference, SupportMessage
+from lsu_mesh.mesh.messages import Base, Bounds, Input, Measurement, Message, Posterior, Reference, SupportMessage
 from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key, start_keys
 from lsu_mesh.mesh.sets import to_message, to_support
-from lsu_mesh.supports.orthotope import Orthotope
+from lsu_mesh.mesh.time_requirements import check_times
 from lsu_mesh.supports.support import Support
 
 About = dict[str, str | int | float | None]
@@ -44,9 +46,9 @@ class Estimator(Node):
         self, configuration: Configuration, name: str, boot: str, engine: Filter, sources: tuple[str, ...]
     ) -> None:
         super().__init__(configuration, name, boot)
+        check_times(configuration, self.role, name)
         self.sources = sources
-        lists_inputs = configuration.input_box is not None
-        self.held = HeldSet(engine, f"{self.role}/{name}", boot, lists_inputs=lists_inputs)
+        self.held = HeldSet(configuration, engine, f"{self.role}/{name}", boot)
         self.timeline = Timeline(configuration, self.history, self.remembered)
         self._source_timeouts = SourceTimeouts(configuration, self.subscriptions(), sources)
         self._has_more = False
@@ -89,6 +91,14 @@ class Estimator(Node):
         """Bounds of the set after the data, as they are published."""
         return self.engine.bounds()
 
+    def is_complete(self, k: int, step: Step, source: str) -> bool:
+        """Whether a source that is there has sent all of step k."""
+        return source in step.arrived
+
+    def lacks_input(self, k: int, step: Step, now: int) -> str:
+        """What input the step's data see and is still waited for; empty where there is none."""
+        return ""
+
     def content(self) -> tuple[object, ...]:
         """What a posterior says besides its set and makes it worth telling again."""
         return ()
@@ -115,6 +125,8 @@ class Estimator(Node):
         step = self.timeline.see(message.step, now)
         if step is None:
             self._counts["late"] += 1
+            return
+        if isinstance(message, Measurement) and not step.takes(message):
             return
         step.arrived[source] = message
         if self.current is not None and self.timeline.is_over(message.step):
@@ -156,7 +168,11 @@ class Estimator(Node):
             k = self.current
             step = self.timeline.step(k)
             if not self.timeline.is_combined:
+                self._waiting = ""
                 if not self._is_ready(k, step, now):
+                    break
+                self._waiting = self.lacks_input(k, step, now)
+                if self._waiting:
                     break
                 messages += self._close(k, step, now)
             if not self._predict(k, step, now):
@@ -178,11 +194,12 @@ class Estimator(Node):
         return max(MAX_AT_ONCE, self.timeline.arrivals.newest - self.current - MAX_AT_ONCE)
 
     def _is_ready(self, k: int, step: Step, now: int) -> bool:
-        if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
+        if step.closed or all(name in self.absent or self.is_complete(k, step, name) for name in self.sources):
             return bool(step.closed or step.arrived or self.timeline.arrivals.newest > k)
-        return self._is_overdue(k, now)
+        return self.is_overdue(k, now)
 
-    def _is_overdue(self, k: int, now: int) -> bool:
+    def is_overdue(self, k: int, now: int) -> bool:
+        """Whether the deadline of step k has passed."""
         sign = self.timeline.arrivals.of(k)
         return sign is not None and now >= sign + self.deadline
 
@@ -192,6 +209,8 @@ class Estimator(Node):
         if self.current is None:
             first = self.timeline.first_evidence
             return None if first is None else first + START_GRACE
+        if self._waiting and self.configuration.input_box is None:
+            return None
         sign = self.timeline.arrivals.of(self.current)
         waits = not self.timeline.is_combined or self.configuration.input_box is not None
         return sign + self.deadline if sign is not None and waits else None
@@ -236,27 +255,38 @@ class Estimator(Node):
 
     def _predict(self, k: int, step: Step, now: int) -> bool:
         """Time update to step k + 1; False where the input is still missing."""
-        u: Vector | Orthotope | None = None
+        u: Drive = None
         if self.engine.model.input_count:
             if step.input is not None:
                 u = np.array(step.input.u)
-            elif self.configuration.input_box is not None and self._is_overdue(k, now):
+            elif self.configuration.input_box is not None and self.is_overdue(k, now):
                 u = self.configuration.input_box
             else:
                 is_late = self.timeline.arrivals.newest > k
                 self._waiting = f"input of step {k} ({input_key(self.configuration)})" if is_late else ""
                 return False
         self._waiting = ""
-        self.held.predict_reach(k, u, step.input)
-        if not self._predict_set(k, u, now):
+        earlier = self._earlier_input(k)
+        self.held.predict_reach(k, u, earlier, message=step.input)
+        if self.configuration.continuous is not None:
+            self.timeline.step(k + 1).origin = None if self.held.unsound else Origin(self.engine.snapshot(), u)
+        if not self._predict_set(k, u, earlier, now=now):
             return False
         self.timeline.advance()
         return True
 
-    def _predict_set(self, k: int, u: Vector | Orthotope | None, now: int) -> bool:
+    def _earlier_input(self, k: int) -> Drive:
+        """What drove the step before, where inputs may act late: it is one that the set is made from."""
+        message = self.timeline.inputs.get(k - 1) if self.configuration.input_delay_ns else None
+        if message is None:
+            return None
+        self.held.record_used([message.reference])
+        return np.array(message.u)
+
+    def _predict_set(self, k: int, u: Drive, earlier: Drive, *, now: int) -> bool:
         """Time update of the set; one that leaves the domain was wrong, one that outgrows all numbers says nothing."""
         try:
-            self.engine.predict(u)
+            predict_step(self.engine, self.configuration, k, u, earlier)
         except (InconsistentData, UnboundedSupport) as error:
             words = f"the prediction from step {k} failed: {error}"
             if not self.start_without_data(k + 1, abandons=True):
@@ -365,7 +395,7 @@ class Estimator(Node):
         self.timeline.never_rewind()
 
     def warm_up(self) -> None:
-        warm_up(self.engine, self.configuration.input_box)
+        warm_up(self.engine, self.configuration)
 
     # -- what is said of the node
 
