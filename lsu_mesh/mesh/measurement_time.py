@@ -65,6 +65,14 @@ def may_be_used(configuration: Configuration, sensor: SensorSettings, time_ns: i
     return error_ns == 0 and configuration.grid.is_on_grid(time_ns, tolerance_ns(sensor))
 
 
+def is_of_its_step(configuration: Configuration, message: Measurement) -> bool:
+    """Whether it was made at t_k, or is taken as that within the sensor's tolerance: for peers that know steps only."""
+    if message.time_error_ns is None:
+        return True
+    tolerance = tolerance_ns(configuration.sensors[message.name]) if configuration.continuous is None else 0
+    return message.time_error_ns == 0 and abs(configuration.grid.time_of(message.step) - message.time_ns) <= tolerance
+
+
 def tolerance_ns(sensor: SensorSettings) -> int:
     """So far from t_k a datum of a discrete model is of step k by declaration."""
     return LEAST_TOLERANCE_NS if sensor.tolerance_ns is None else sensor.tolerance_ns

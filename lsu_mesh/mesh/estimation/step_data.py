@@ -22,6 +22,7 @@ from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
 from lsu_mesh.mesh.estimation.time_update import Origin
 from lsu_mesh.mesh.measurement_time import tolerance_ns
 from lsu_mesh.mesh.messages import Input, Measurement, Reference
+from lsu_mesh.mesh.time_requirements import ONE_UPDATE
 from lsu_mesh.model import ContinuousModel
 
 BEFORE_PRIOR = "before the prior"
@@ -125,12 +126,12 @@ class StepData:
 
 
 class DataOfSteps:
-    """Makes the data of the steps of one filter from what its sensors have sent."""
+    """Makes the data of the steps of one filter, of this kind, from what its sensors have sent."""
 
-    def __init__(self, configuration: Configuration, sensors: Sequence[str], *, one_each: bool = False) -> None:
+    def __init__(self, configuration: Configuration, sensors: Sequence[str], kind: str) -> None:
         self._configuration = configuration
         self._sensors = sensors
-        self._one_each = one_each
+        self._one_each = kind in ONE_UPDATE
         self._outputs = {name: configuration.model([name]) for name in sensors}
         self._rows: dict[str, slice] = {}
         start = 0

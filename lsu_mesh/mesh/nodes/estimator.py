@@ -16,21 +16,16 @@ from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.estimation.held_set import HeldSet
 from lsu_mesh.mesh.estimation.step_record import Combined, Step, published_content
 from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
-from lsu_mesh.mesh.estimation.timeline import Timeline
 from lsu_mesh.mesh.estimation.warm_up import warm_up
-from lsu_mesh.mesh.messages import Base, Bounds, Input, Measurement, Message, Posterior, Reference, SupportMessage
-from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
-from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key, start_keys
-from lsu_mesh.mesh.sets import to_message, to_support
-from lsu_mesh.mesh.time_requirements import check_times
-from lsu_mesh.supports.support import Support
+from lsu_mesh.mesh.messages import Bounds, Input, Measurement, Message, Posterior, SupportMessage
+from lsu_mesh.mesh.nodes.node import Complaint
+from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key
+from lsu_mesh.mesh.nodes.starting import START_GRACE, About, StartingNode
+from lsu_mesh.mesh.sets import to_message
 
-About = dict[str, str | int | float | None]
-START_GRACE = SECOND // 2
-"""How long a late joiner listens to the past before it chooses where to start."""
+__all__ = ["START_GRACE", "Estimator"]
 MAX_AT_ONCE = 1024
 """Steps done in one tick, the next tick goes on; more only where more than this would be left."""
 MAX_MESSAGES = 32
@@ -39,25 +34,16 @@ MAX_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
 
 
-class Estimator(Node):
+class Estimator(StartingNode):
     """A node that holds one set per step."""
 
     def __init__(
         self, configuration: Configuration, name: str, boot: str, engine: Filter, sources: tuple[str, ...]
     ) -> None:
-        super().__init__(configuration, name, boot)
-        check_times(configuration, self.role, name)
-        self.sources = sources
-        self.held = HeldSet(configuration, engine, f"{self.role}/{name}", boot)
-        self.timeline = Timeline(configuration, self.history, self.remembered)
+        super().__init__(configuration, name, boot, engine=engine, sources=sources)
         self._source_timeouts = SourceTimeouts(configuration, self.subscriptions(), sources)
         self._has_more = False
         """Whether the last tick has left steps that may be ready."""
-        self._candidate: Posterior | None = None
-        self._waiting = ""
-        self._counts: dict[str, float] = dict.fromkeys(("late", "rewinds", "contradictions", "behind", "resets"), 0)
-        self._remarks: list[Message] = []
-        """Events of a time update."""
         self.last_posterior: Posterior | None = None
         self.absent: set[str] = set()
         """Sources that are known to be gone and are not waited for."""
@@ -68,16 +54,6 @@ class Estimator(Node):
     @abstractmethod
     def deadline(self) -> int:
         """How long to wait for a step's sources after its first sign, in nanoseconds."""
-
-    @property
-    @abstractmethod
-    def history(self) -> int:
-        """How many steps back a late message may rewind."""
-
-    @property
-    def remembered(self) -> int:
-        """How many steps back inputs are kept, so that all of ``history`` can be done again."""
-        return self.history
 
     @abstractmethod
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
@@ -109,16 +85,6 @@ class Estimator(Node):
 
     # -- messages in
 
-    @property
-    def engine(self) -> Filter:
-        """The filter that holds the set."""
-        return self.held.engine
-
-    @property
-    def current(self) -> int | None:
-        """The step that the estimator is at; None before it has started."""
-        return self.timeline.current
-
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""
         self._source_timeouts.received(source, now)
@@ -145,13 +111,6 @@ class Estimator(Node):
             text = f"input of step {message.step} came again from {message.src} with another value; the first counts"
             return [self.event("WARN", "input-changed", text, now=now, step=message.step, about=about)]
         return []
-
-    def take_candidate(self, message: Posterior) -> None:
-        """Note a sound set of the mesh from which a late joiner may start."""
-        if message.src == f"{self.role}/{self.name}":
-            self.held.epochs.continue_from(message.epoch)
-        if message.status in ("ok", "predicted") and (self._candidate is None or message.step > self._candidate.step):
-            self._candidate = message
 
     # -- the course of steps
 
@@ -306,93 +265,6 @@ class Estimator(Node):
         if step is not None and step.before is not None:
             self._counts["rewinds"] += 1
             self.held.restore(step.before)
-
-    # -- where to start
-
-    def _start(self, now: int) -> bool:
-        """Choose the first step and the set that surely holds its state."""
-        evidence = self.timeline.first_evidence
-        if evidence is None:
-            return False
-        first = self.timeline.steps()[0][0]
-        if first > 1 and now < evidence + START_GRACE:
-            return False
-        if (first == 1 and self._start_from_prior(1)) or self._start_from_candidate() or self._start_from_prior(first):
-            return True
-        domain = self.engine.model.domain
-        if domain is not None:
-            self._begin(first, domain, "domain")
-            return True
-        missing = next((j for j in range(1, first + 1) if self._input_missing(j)), first)
-        inputs = f"the inputs since step {missing} ({input_key(self.configuration)})"
-        self._waiting = f"a sound set to start from ({start_keys(self)}), or {inputs}"
-        return False
-
-    def _start_from_candidate(self) -> bool:
-        candidate = self._candidate
-        if candidate is None or self.held.epochs.is_abandoned(candidate) or self._input_missing(candidate.step):
-            return False
-        try:
-            self._begin(candidate.step, to_support(candidate.support), candidate.reference)
-        except InconsistentData:  # it is empty: whoever sent it was wrong
-            self._candidate = None
-            return False
-        self.held.add_dependency(candidate)
-        return True
-
-    def _start_from_prior(self, first: int) -> bool:
-        if any(self._input_missing(j) for j in range(1, first)):
-            return False
-        self._begin(1, self.configuration.prior, "prior", restarted=False)
-        self.held.reach.begin(self.configuration.prior)
-        return True
-
-    def _input_missing(self, k: int) -> bool:
-        if self.engine.model.input_count == 0 or self.configuration.input_box is not None:
-            return False
-        return not self.timeline.has_input(k)
-
-    def _begin(self, k: int, support: Support, base: Base, *, restarted: bool = True) -> None:
-        """Begin at step k, with a set that surely holds its state; ``restarted``: in the middle of a run."""
-        self.held.begin(support, base, restarted=restarted)
-        self._waiting = ""
-        self.timeline.begin(k)
-
-    def _start_over(self, k: int, why: str, now: int) -> None:
-        """Nothing is known behind step k: join again there, like a peer that starts late."""
-        self.join_again(k + 1, now)
-        self._counts["resets"] += 1
-        text = f"{why}; starting again behind it"
-        self._remarks.append(self.event("ERROR", "started-over", text, now=now, step=k, about={"step": k}))
-
-    def join_again(self, first: int, since: int) -> None:
-        """Forget what is before a step and start from there, as a peer that has listened since then."""
-        self.timeline.leave(first, since)
-        self._candidate = None
-        self.held.reach.lose()
-
-    def start_without_data(self, k: int, *, abandons: bool) -> bool:
-        """Hold what holds the state of step k whatever was measured; False, and nothing changes, without any."""
-        start = self.held.start_without_data(k)
-        if start is None:
-            return False
-        support, base, used = start
-        self.engine.reset(support)
-        if abandons:
-            self.abandon_epoch("")
-        self.start_from(base, used)
-        return True
-
-    def abandon_epoch(self, why: str) -> None:
-        """Tell all who relied on the own sets not to; ``why`` the engine holds nothing that may be believed now."""
-        self.held.abandon_epoch(why)
-        self._counts["resets"] += 1
-        self.timeline.never_rewind()
-
-    def start_from(self, base: Base, used: tuple[Reference, ...] = ()) -> None:
-        """Note that the engine now holds a set made from ``base`` and ``used`` alone."""
-        self.held.start_from(base, used)
-        self.timeline.never_rewind()
 
     def warm_up(self) -> None:
         warm_up(self.engine, self.configuration)

@@ -17,8 +17,9 @@ from lsu_mesh.mesh.estimation.filter_step import (
 )
 from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
 from lsu_mesh.mesh.estimation.message_fields import described, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.received_data import ReceivedData
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
-from lsu_mesh.mesh.estimation.step_data import BEFORE_PRIOR, DataOfSteps, StepData, Unused
+from lsu_mesh.mesh.estimation.step_data import BEFORE_PRIOR, StepData, Unused
 from lsu_mesh.mesh.estimation.step_record import Combined, Step
 from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, Transfer
 from lsu_mesh.mesh.measurement_time import is_timed
@@ -29,19 +30,15 @@ from lsu_mesh.mesh.messages import (
     Message,
     Posterior,
     Prediction,
-    Reference,
     Suggestion,
     SupportMessage,
 )
-from lsu_mesh.mesh.nodes.estimator import About, Estimator
+from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter_events import dropped_event
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.source_timeout import input_key
+from lsu_mesh.mesh.nodes.starting import About
 from lsu_mesh.mesh.sets import to_message
-from lsu_mesh.mesh.time_requirements import ONE_UPDATE
-
-MAX_UNUSED = 65536
-"""So many measurements that were not used are remembered, to count each once."""
 
 
 class FilterNode(Estimator):
@@ -63,9 +60,7 @@ class FilterNode(Estimator):
             sources=settings.sensors,
         )
         self.held.limit_guarantee(declared_guarantee(configuration, settings))
-        self._data_of_steps = DataOfSteps(configuration, settings.sensors, one_each=settings.kind in ONE_UPDATE)
-        self._newest_timed: dict[str, int] = {}
-        """The newest step of each sensor that sends times."""
+        self._received = ReceivedData(configuration, settings.sensors, self.timeline, settings.kind)
         self._sensor_of_row = [sensor for sensor in settings.sensors for _ in configuration.sensors[sensor].C]
         self._inconsistent: set[int] = set()
         """Steps in a row, up to the current one, whose data contradicted the set."""
@@ -77,8 +72,6 @@ class FilterNode(Estimator):
         self._factor = 1.0
         """By how much r was widened in the current step."""
         self._counts["transfers rejected"] = 0
-        self._unused: set[Reference] = set()
-        """Measurements that were not used, each counted once."""
         self._announced: Suggestion | None = None
         """Bounds that are adopted at a step to come."""
 
@@ -127,13 +120,13 @@ class FilterNode(Estimator):
 
     def _receive_measurement(self, message: Measurement, now: int) -> list[Message]:
         if message.step < 1:
-            self._count_unused(Unused(message, BEFORE_PRIOR))
+            self._received.count(Unused(message, BEFORE_PRIOR))
             return []
-        if is_timed(message):
-            self._newest_timed[message.name] = max(message.step, self._newest_timed.get(message.name, 0))
         first = None if is_timed(message) else self.timeline.untimed(message.step, message.name)
         if first is None:
             self.take(message.name, message, now)
+            if message.step <= self.timeline.arrivals.newest:  # not from the future
+                self._received.note(message)
         elif first.y != message.y:
             text = f"{message.name} sent step {message.step} again with another value; the first counts"
             about: About = {"sensor": message.name, "step": message.step}
@@ -141,31 +134,25 @@ class FilterNode(Estimator):
         return []
 
     def is_complete(self, k: int, step: Step, source: str) -> bool:
-        """A datum at t_k, or one of a later step from a sensor that sends times: more of step k will not come."""
-        if self._newest_timed.get(source, 0) > k:
-            return True
-        end = self.configuration.grid.time_of(k)
-        return any(one.name == source and (not is_timed(one) or one.time_ns == end) for one in step.data)
+        return self._received.is_complete(k, step, source)
 
     def lacks_input(self, k: int, step: Step, now: int) -> str:
-        """What input the step's data see and is still waited for; of a closed step the box stands in for it."""
-        box = self.configuration.input_box
-        for j in sorted({j for one in step.data for j in self._data_of_steps.inputs_of(k, one) if j >= k}):
-            may_take_box = box is not None and (step.closed or self.is_overdue(k, now))
-            if not (self.timeline.has_input(j) or may_take_box or self.timeline.input_is_lost(j)):
-                return f"input of step {j} ({input_key(self.configuration)})"
-        return ""
+        j = self._received.missing_input(k, step, lambda: self.is_overdue(k, now))
+        return "" if j is None else f"input of step {j} ({input_key(self.configuration)})"
+
+    def counters(self) -> dict[str, float]:
+        return super().counters() | self._received.counts
 
     # -- one step
 
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
         self._factor = 1.0
         adopted = self._adopt(k, now)
-        data = self._gather(k, step)
+        data = self._received.gather(k, step, self.engine.model.r)
         missing = [name for name in self.sources if not data.has(name)]
         messages = [*adopted, *self._repair(data, now)]
         if step.origin is None:  # another set is held than that which was carried on from the step before
-            data = self._data_of_steps.at_start(data)
+            data = self._received.at_start(data)
         origin = min((one.message.origin_ns for one in data.data), default=None)
         nothing = Combined("inconsistent", used=[], missing=missing, origin=origin, cause=self.held.unsound)
         if self.held.unsound:
@@ -175,7 +162,7 @@ class FilterNode(Estimator):
         if self.held.unsound:  # the data are not in the set: it is the one from before, of which nothing is believed
             return replace(nothing, cause=str(outcome.error)), messages
         if step.origin is None:
-            data = self._data_of_steps.at_start(data)
+            data = self._received.at_start(data)
         for message in outcome.transfers:
             self.held.add_dependency(message)
             if self._transfer.way == "data-predictor":
@@ -194,25 +181,6 @@ class FilterNode(Estimator):
             cause=self._cause(outcome),
             gain=outcome.gain,
         ), messages
-
-    def _gather(self, k: int, step: Step) -> StepData:
-        """The step's data; what is not used is counted once, and an input box that was seen is remembered."""
-        r, inputs = self.engine.model.r, self.timeline.inputs
-        data = self._data_of_steps.gather(k, step.data, r, origin=step.origin, known=inputs)
-        for unused in data.unused:
-            self._count_unused(unused)
-        for one in data.data:
-            for j in self._data_of_steps.inputs_of(k, one.message):
-                if j not in inputs:
-                    self.timeline.sees_box(k, j)
-        return data
-
-    def _count_unused(self, unused: Unused) -> None:
-        if unused.message.reference not in self._unused:
-            self._unused.add(unused.message.reference)
-            self._counts[unused.reason] = self._counts.get(unused.reason, 0) + 1
-            if len(self._unused) > MAX_UNUSED:
-                self._unused.clear()
 
     def _adopt(self, k: int, now: int) -> list[Message]:
         """Go by announced bounds from their step on: from the domain, in a new epoch, and never better than learned."""
@@ -312,7 +280,7 @@ class FilterNode(Estimator):
         """Too many contradictions in a row: start again from something sound, or say that there is nothing."""
         self._inconsistent.clear()
         k, count = data.k, self.settings.reset_after
-        data = self._data_of_steps.at_start(data)
+        data = self._received.at_start(data)
         start = self._start_again(data, abandons=True)
         if start is not None:
             self.abandon_epoch("")
@@ -331,7 +299,7 @@ class FilterNode(Estimator):
     def _refuse_start(self, data: StepData, error: InconsistentData, now: int) -> list[Message]:
         """The set that the node started from misses the first data: it was not sound."""
         self._is_tested = True
-        data = self._data_of_steps.at_start(data)
+        data = self._received.at_start(data)
         event = self._abandon(data, f"the set that it started from contradicts the data: {error}", about={}, now=now)
         if not self.held.unsound:
             data.update(self.engine)
@@ -372,7 +340,7 @@ class FilterNode(Estimator):
 
     def _start_again(self, data: StepData, *, abandons: bool) -> Start | None:
         """A set of the step, before its data, that is sound and meets them; ``None`` where there is none."""
-        at_start, inputs = self._data_of_steps.at_start(data), self.timeline.inputs
+        at_start, inputs = self._received.at_start(data), self.timeline.inputs
         return self._restart_search.find(self.engine, at_start, reach=self.held.reach, inputs=inputs, abandons=abandons)
 
     def _start_from_candidate(self) -> bool:

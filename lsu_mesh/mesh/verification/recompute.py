@@ -26,7 +26,6 @@ from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.transfer import Transfer
 from lsu_mesh.mesh.messages import Base, Bounds, Fused, Input, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.sets import to_message, to_support
-from lsu_mesh.mesh.time_requirements import ONE_UPDATE
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.provenance_steps import Brought, provenance_steps
 from lsu_mesh.supports.orthotope import Orthotope
@@ -237,7 +236,7 @@ class FilterRecomputation(Recomputation):
         engine = make_engine(settings, configuration.model(settings.sensors), configuration.prior)
         super().__init__(configuration, archive, engine)
         self._transfer = Transfer(configuration, settings)
-        self._data_of_steps = DataOfSteps(configuration, settings.sensors, one_each=settings.kind in ONE_UPDATE)
+        self._data_of_steps = DataOfSteps(configuration, settings.sensors, settings.kind)
         self._declared = engine
         self._adopted: dict[str, dict[int, Filter]] = {}
         """By process, the epoch at which bounds were adopted and the filter that goes by them."""

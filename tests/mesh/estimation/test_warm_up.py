@@ -43,7 +43,7 @@ for other in (Parallelotope([0.0] * 3, 5.0 * np.eye(3)), box, node.engine.suppor
     node.engine.reset(other)
     node.engine.predict(np.zeros(1))
 node.held.reach.begin(box)
-node.held.reach.predict(np.zeros(1))
+node.held.reach.predict(np.zeros(1), 1)
 print(sorted(loaded() - known))
 """
 
