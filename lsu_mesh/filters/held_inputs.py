@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,16 +17,31 @@ Input = Vector | Orthotope | None
 """A vector (p,), a box where the input is not known, or ``None`` for a model without inputs."""
 
 
+class Piece(NamedTuple):
+    """A stretch with one input; where it ``varies`` nothing is known but that it stays in the box ``u``."""
+
+    length_ns: int
+    u: Input
+    varies: bool = False
+
+
 class HeldInputs:
     """``values[i]`` acts from ``times_ns[i]`` on, up to the next switch; times increase.
 
     ``before``: what acts before the first switch; without it nothing is known there, and to ask is a ``ModelError``.
+    ``delay_ns``: every switch takes place up to so much after its time, nobody knows when; until then the input varies
+    between the two. A switch must not come sooner than this after the one before.
     """
 
-    def __init__(self, times_ns: Sequence[int], values: Sequence[Input], before: Input = None) -> None:
+    def __init__(
+        self, times_ns: Sequence[int], values: Sequence[Input], before: Input = None, *, delay_ns: int = 0
+    ) -> None:
         if len(times_ns) != len(values) or any(a >= b for a, b in itertools.pairwise(times_ns)):
             raise ModelError("inputs need one time each, and the times must increase")
+        if delay_ns < 0 or any(b - a < delay_ns for a, b in itertools.pairwise(times_ns)):
+            raise ModelError(f"a delay of {delay_ns} ns must not be negative, nor longer than an input is held")
         self._times, self._values, self._before = tuple(times_ns), tuple(values), before
+        self._delay = delay_ns
 
     @classmethod
     def constant(cls, u: Input = None) -> HeldInputs:
@@ -36,18 +52,27 @@ class HeldInputs:
         """What acts from this moment on."""
         return self._value(bisect_right(self._times, time_ns) - 1)
 
-    def pieces(self, start_ns: int, end_ns: int) -> Iterator[tuple[int, Input]]:
-        """``(length in ns, input)`` of each stretch between switches from start to end, in order."""
+    def pieces(self, start_ns: int, end_ns: int) -> Iterator[Piece]:
+        """Each stretch between switches from start to end, in order."""
         index = bisect_right(self._times, start_ns) - 1
         while start_ns < end_ns:
             following = self._times[index + 1] if index + 1 < len(self._times) else end_ns
-            until = min(following, end_ns)
-            yield until - start_ns, self._value(index)
-            start_ns, index = until, index + 1
+            settled = self._times[index] + self._delay if index >= 0 else start_ns
+            if start_ns < settled:
+                until = min(settled, following, end_ns)
+                yield Piece(until - start_ns, self._between(index - 1, index), varies=True)
+            else:
+                until = min(following, end_ns)
+                yield Piece(until - start_ns, self._value(index))
+            start_ns, index = until, index + (until == following)
 
     def hull(self, start_ns: int, end_ns: int) -> Input:
         """One input, or a box, that holds every input that acts in [start, end]."""
-        first, last = bisect_right(self._times, start_ns) - 1, bisect_right(self._times, end_ns) - 1
+        first = bisect_right(self._times, start_ns - self._delay) - 1
+        return self._between(first, bisect_right(self._times, end_ns) - 1)
+
+    def _between(self, first: int, last: int) -> Input:
+        """The hull of these values."""
         values = [self._value(i) for i in range(first, last + 1)]
         if len(values) == 1 or any(value is None for value in values):
             return values[0]

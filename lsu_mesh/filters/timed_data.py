@@ -15,11 +15,12 @@ import numpy as np
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.filters.held_inputs import HeldInputs
+from lsu_mesh.filters.held_inputs import HeldInputs, Piece
 from lsu_mesh.filters.time_error import time_widening
 from lsu_mesh.filters.validation import half_width_vector
 from lsu_mesh.kernels.runtime.rounding import EPSILON
 from lsu_mesh.model import ContinuousModel, LSUModel
+from lsu_mesh.supports.orthotope import Orthotope
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +59,25 @@ def carry(filter: Filter, flow: ContinuousModel, start_ns: int, end_ns: int, inp
         raise ModelError(f"nothing is carried backwards: from {start_ns} ns to {end_ns} ns")
     before = filter.snapshot()
     try:
-        for length_ns, u in inputs.pieces(start_ns, end_ns):
-            filter.predict(u, model=flow.discretised(length_ns))
+        for piece in inputs.pieces(start_ns, end_ns):
+            _predict(filter, flow, piece)
     except InconsistentData:
         filter.restore(before)
         raise
+
+
+def _predict(filter: Filter, flow: ContinuousModel, piece: Piece) -> None:
+    """An input that varies within its box, nobody knows how, is one more noise."""
+    if not (piece.varies and isinstance(piece.u, Orthotope)):
+        filter.predict(piece.u, model=flow.discretised(piece.length_ns))
+        return
+    rates, (lower, upper) = flow.rates, piece.u.bounds()
+    assert rates.B is not None
+    middle = lower + 0.5 * (upper - lower)
+    reach = np.nextafter(np.maximum(upper - middle, middle - lower), np.inf)
+    N = np.eye(rates.state_count) if rates.noise_map is None else rates.noise_map
+    noisier = flow.replace(noise_map=np.hstack([N, rates.B]), rho=np.append(rates.rho, reach))
+    filter.predict(middle, model=noisier.discretised(piece.length_ns))
 
 
 def half_widths_at(filter: Filter, flow: ContinuousModel, datum: TimedDatum, inputs: HeldInputs) -> Vector | None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.measurement_time import is_timed, placed
 from lsu_mesh.mesh.messages import (
     ConstrainedZonotopeMessage,
     Fused,
@@ -75,11 +76,14 @@ class Sequence:
 class Admission:
     """Decodes payloads and lets through what this mesh's configuration says may come.
 
+    A measurement with a time of its own gets the step of that time, 0 where it lies before the first step.
+
     ``counters`` holds ``received``, ``duplicates``, ``gaps`` and ``refused.<reason>``; where a newer peer sends fields
     that are unknown here, also ``unknown fields``, the messages that had some, and ``unknown fields.<topic>.<field>``.
     """
 
     def __init__(self, configuration: Configuration, topics: Collection[str]) -> None:
+        self._configuration = configuration
         self._mesh = configuration.mesh.name
         self._digest = configuration.digest()
         self._topics = frozenset(topics)
@@ -171,6 +175,8 @@ class Admission:
         if message.model != self._digest:
             raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
         self._check_shape(address.name, message)
+        if isinstance(message, Measurement):
+            message = placed(self._configuration, message)
         return message, unknown
 
     def _check_shape(self, name: str, message: Message) -> None:
@@ -191,7 +197,8 @@ class Admission:
             return
         if found != expected:
             raise Refused("shape", f"{found} numbers, expected {expected}")
-        if message.step < 1:
+        counts_by_time = isinstance(message, Measurement) and is_timed(message)
+        if message.step < 1 and not counts_by_time:
             raise Refused("step", "steps count from 1")
         if self._last is not None and message.step > self._last + 1:
             raise Refused("step", f"step {message.step} of a mesh that ends at step {self._last}")

@@ -6,18 +6,24 @@ set, bit by bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, assert_never
 
 import numpy as np
 
-from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.mesh.config.settings import Configuration, OnInconsistency
-from lsu_mesh.mesh.estimation.inconsistency import Dropped, update_without_contradicting_strips, widen
-from lsu_mesh.mesh.messages import Fused, Measurement, Prediction
+from lsu_mesh.mesh.config.settings import OnInconsistency
+from lsu_mesh.mesh.estimation.inconsistency import (
+    Dropped,
+    DroppedStrip,
+    update_without_contradicting_strips,
+    widen,
+)
+from lsu_mesh.mesh.estimation.step_data import StepData
+from lsu_mesh.mesh.estimation.timed_step import Walk, contradicting_strips, remaining_strips, without
+from lsu_mesh.mesh.messages import Fused, Prediction
 from lsu_mesh.supports.support import Support
 
 Transferred = Prediction | Fused
@@ -41,7 +47,8 @@ class FilterOutcome:
     """What came of a step's data.
 
     ``transfers`` are those in the set, ``gain`` theirs in nats (``None``: none is); ``factor`` is that by which r was
-    widened; ``error`` says how the data contradict the set, and ``dropped`` which rows were left out for it.
+    widened; ``error`` says how the data contradict the set, and ``dropped`` which rows were left out for it, or
+    ``strips``, of data with moments of their own.
     """
 
     status: Literal["ok", "predicted", "inconsistent"]
@@ -51,6 +58,7 @@ class FilterOutcome:
     factor: float = 1.0
     error: InconsistentData | None = None
     dropped: Dropped | None = None
+    strips: Sequence[DroppedStrip] = ()
 
 
 def contradiction_rule(choice: OnInconsistency) -> Rule:
@@ -64,36 +72,32 @@ def contradiction_rule(choice: OnInconsistency) -> Rule:
             assert_never(choice)
 
 
-def stack(configuration: Configuration, sensors: Sequence[str], measured: Mapping[str, Measurement]) -> Vector:
-    """Measured outputs (m,) by sensor, then row; NaN where missing."""
-    y: list[float] = []
-    for sensor in sensors:
-        message = measured.get(sensor)
-        values = [None] * len(configuration.sensors[sensor].C) if message is None else message.y
-        y += [np.nan if value is None else value for value in values]
-    return np.array(y, dtype=np.float64)
-
-
 def filter_step(
-    engine: Filter, y: Vector, transfers: Sequence[Transferred], as_set: AsSet, rule: Rule
+    engine: Filter, data: StepData, transfers: Sequence[Transferred], as_set: AsSet, rule: Rule
 ) -> FilterOutcome:
-    """Bring one step's data into the engine's set: ``condition`` on each transfer, then ``update`` with y (m,).
+    """Bring one step's data into the engine's set of x(t_k), the prediction.
 
-    Transfers give way where the data agree with the set without them. Else data that contradict the set are treated
-    by ``rule``; where no factor of r explains them, ``"widen"`` is ``"drop"``.
+    Data before t_k go from the posterior of the step before, each at its own moment; then ``condition`` on each
+    transfer; then the data at t_k. Transfers give way where the data agree with the set without them. Else data that
+    contradict the set are treated by ``rule``; where no factor of r explains them, ``"widen"`` is ``"drop"``.
     """
+    if data.y is None:
+        return _walked_step(engine, data, transfers, as_set=as_set, rule=rule)
     before = engine.snapshot()
     used, gain, rejected = _bring(engine, transfers, as_set)
-    if np.isnan(y).all():
+    if np.isnan(data.y).all():
         return FilterOutcome("predicted", used, gain, rejected)
     try:
-        engine.update(y)
+        data.update(engine)
     except InconsistentData as error:
-        if used and _agrees_without_transfers(engine, y, before):
-            why = "it contradicts the data"
-            return FilterOutcome("ok", rejected=[*rejected, *(RejectedTransfer(one, why, True) for one in used)])
-        return _contradicted(engine, y, FilterOutcome("inconsistent", used, gain, rejected, error=error), rule)
+        if used and _agrees_without_transfers(engine, data, before):
+            return FilterOutcome("ok", rejected=[*rejected, *_by_data(used)])
+        return _contradicted(engine, data, FilterOutcome("inconsistent", used, gain, rejected, error=error), rule)
     return FilterOutcome("ok", used, gain, rejected)
+
+
+def _by_data(used: Sequence[Transferred]) -> list[RejectedTransfer]:
+    return [RejectedTransfer(one, "it contradicts the data", True) for one in used]
 
 
 def _bring(
@@ -112,39 +116,88 @@ def _bring(
     return used, gain if used else None, rejected
 
 
-def _agrees_without_transfers(engine: Filter, y: Vector, before: object) -> bool:
-    """Update the set as it was before the transfers; False, and as it was after them, where y misses that too."""
+def _agrees_without_transfers(engine: Filter, data: StepData, before: object) -> bool:
+    """Update the set as it was before the transfers; False, and as it was after them, where the data miss that too."""
     after = engine.snapshot()
     engine.restore(before)
     try:
-        engine.update(y)
+        data.update(engine)
     except InconsistentData:
         engine.restore(after)
         return False
     return True
 
 
-def _contradicted(engine: Filter, y: Vector, found: FilterOutcome, rule: Rule) -> FilterOutcome:
-    """What becomes of data that are proved to miss the set."""
+def _contradicted(engine: Filter, data: StepData, found: FilterOutcome, rule: Rule) -> FilterOutcome:
+    """What becomes of data at t_k that are proved to miss the set."""
     match rule:
         case "refuse":
             return found
         case "widen":
-            factor = widen(engine, y)
+            factor = widen(engine, lambda factor: data.update(engine, factor))
             if factor is not None:
-                return FilterOutcome(
-                    status="ok",
-                    transfers=found.transfers,
-                    gain=found.gain,
-                    rejected=found.rejected,
-                    factor=factor,
-                    error=found.error,
-                )
+                return replace(found, status="ok", factor=factor)
         case "drop":
             pass
         case _:
             assert_never(rule)
-    dropped = update_without_contradicting_strips(engine, y)
-    return FilterOutcome(
-        "inconsistent", found.transfers, found.gain, found.rejected, error=found.error, dropped=dropped
-    )
+    assert data.y is not None
+    dropped = update_without_contradicting_strips(engine, data.y, data.r, data.u)
+    return replace(found, dropped=dropped)
+
+
+def _walked_step(
+    engine: Filter, data: StepData, transfers: Sequence[Transferred], as_set: AsSet, rule: Rule
+) -> FilterOutcome:
+    """A step whose data have moments of their own."""
+    walk = Walk(data, engine.snapshot())
+    found = FilterOutcome("ok")
+
+    def bring_transfers() -> None:
+        nonlocal found
+        found = FilterOutcome("ok", *_bring(engine, transfers, as_set))
+
+    try:
+        walk.go(engine, bring_transfers)
+    except InconsistentData as error:
+        if found.transfers and _goes(engine, walk):
+            return FilterOutcome("ok", rejected=[*found.rejected, *_by_data(found.transfers)])
+        engine.restore(walk.prediction)
+        if rule == "refuse":
+            return replace(found, status="inconsistent", error=error)
+        if rule == "widen":
+            factor = widen(engine, lambda factor: walk.go(engine, bring_transfers, factor))
+            if factor is not None:
+                return replace(found, factor=factor, error=error)
+            engine.restore(walk.prediction)
+        strips = _go_without_contradicting(engine, walk, bring_transfers)
+        return replace(found, status="inconsistent", error=error, strips=strips)
+    return found
+
+
+def _goes(engine: Filter, walk: Walk) -> bool:
+    """Whether the data agree with the set without transfers."""
+    try:
+        walk.go(engine, lambda: None)
+    except InconsistentData:
+        return False
+    return True
+
+
+def _go_without_contradicting(
+    engine: Filter, walk: Walk, bring_transfers: Callable[[], None]
+) -> tuple[DroppedStrip, ...]:
+    """Make the step anew without the strips that alone contradict the set; without any data where that does not do."""
+    alone = contradicting_strips(engine, walk)
+    left = without(walk.data, alone)
+    if alone:
+        try:
+            Walk(left, walk.prediction).go(engine, bring_transfers)
+        except InconsistentData:
+            pass
+        else:
+            return tuple(strip for _, _, strip in alone)
+    engine.restore(walk.prediction)
+    together = remaining_strips(engine, left)
+    bring_transfers()
+    return (*(strip for _, _, strip in alone), *together)

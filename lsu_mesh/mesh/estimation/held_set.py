@@ -12,8 +12,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from lsu_mesh.array_types import Vector
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.held_inputs import Input as Drive
+from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.epochs import Epochs
 from lsu_mesh.mesh.estimation.open_loop import OpenLoop
 from lsu_mesh.mesh.messages import Base, Guarantee, Input, Mark, Posterior, Prediction, Reference
@@ -45,18 +46,19 @@ class HeldSet:
 
     Parameters
     ----------
+    configuration:
+        The mesh; where its input box may stand in for an input, a start from the reach lists the inputs that did not
+        need it.
     engine:
         The filter whose set it is.
     src, boot:
         Of the process that holds it.
-    lists_inputs:
-        Whether an input box may stand in for an input, so that a start from the reach lists the inputs that did not.
     """
 
-    def __init__(self, engine: Filter, src: str, boot: str, *, lists_inputs: bool) -> None:
+    def __init__(self, configuration: Configuration, engine: Filter, src: str, boot: str) -> None:
         self.engine = engine
         self.epochs = Epochs(src, boot)
-        self.reach = OpenLoop(engine.model, lists_inputs=lists_inputs)
+        self.reach = OpenLoop(configuration, engine.model, lists_inputs=configuration.input_box is not None)
         """The prior carried through every input: from here one can always start again."""
         self.base: Base = "prior"
         self.used: tuple[Reference, ...] = ()
@@ -69,6 +71,11 @@ class HeldSet:
         """The weakest guarantee among all that the set descends from."""
         self.is_restarted = False
         """Whether the next set that is published is the first since a start in the middle of a run."""
+
+    def limit_guarantee(self, guarantee: Guarantee) -> None:
+        """No set of the estimator is better than this."""
+        self.best_guarantee = weakest((self.best_guarantee, guarantee))
+        self.downgrade_guarantee(guarantee)
 
     @property
     def descent(self) -> list[Mark]:
@@ -135,11 +142,11 @@ class HeldSet:
         """The set is that of a message, from which the next are made."""
         self.base, self.used = posterior.reference, ()
 
-    def predict_reach(self, k: int, u: Vector | Orthotope | None, message: Input | None) -> None:
+    def predict_reach(self, k: int, u: Drive, earlier: Drive, *, message: Input | None) -> None:
         """Carry the prior on through the input of step k, and note the input's message where it is known."""
         if message is not None:
             self.record_used([message.reference])
-        self.reach.predict(u, k, None if message is None else message.reference)
+        self.reach.predict(u, k, earlier, reference=None if message is None else message.reference)
 
     # -- going back
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
-from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
+from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.filters.lsuo import LSUO
+from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.estimation.time_update import predict_step
 from lsu_mesh.mesh.messages import Reference
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -19,11 +21,13 @@ MAX_LISTED = 2048
 class OpenLoop:
     """The reachable box ``X_{k+1} = |A| X_k ⊕ B u_k ⊕ N box(rho)`` of the prior, met with the domain; no data in it.
 
-    It is lost when a node starts from anything but the prior, when an input is lost, or when it has outgrown double
-    precision. ``lists_inputs``: whether it remembers which inputs were known, because a box may stand in for others.
+    Each step by its own model, where there is more than one. It is lost when a node starts from anything but the prior,
+    when an input is lost, or when it has outgrown double precision. ``lists_inputs``: whether it remembers which inputs
+    were known, because a box may stand in for others.
     """
 
-    def __init__(self, model: LSUModel, *, lists_inputs: bool = False) -> None:
+    def __init__(self, configuration: Configuration, model: LSUModel, *, lists_inputs: bool = False) -> None:
+        self._configuration = configuration
         self._model = model
         self._lists_inputs = lists_inputs
         self._engine: LSUO | None = None
@@ -58,15 +62,18 @@ class OpenLoop:
         self._engine = None
         self._inputs.clear()
 
-    def predict(self, u: Vector | Orthotope | None, k: int = 0, reference: Reference | None = None) -> None:
-        """Time update of step k with its input, called ``reference``, or with the box of all inputs."""
+    def predict(self, u: Drive, k: int, earlier: Drive = None, *, reference: Reference | None = None) -> None:
+        """Time update of step k with its input, called ``reference``, or with the box of all inputs.
+
+        ``earlier`` is that of the step before, see :func:`predict_step`.
+        """
         if self._engine is None:
             return
         self._inputs.pop(k, None)
         if self._lists_inputs and reference is not None and k <= MAX_LISTED:
             self._inputs[k] = reference
         try:
-            self._engine.predict(u)
+            predict_step(self._engine, self._configuration, k, u, earlier)
         except (UnboundedSupport, InconsistentData):
             self.lose()
 

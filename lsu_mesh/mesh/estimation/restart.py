@@ -10,9 +10,11 @@ import numpy as np
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.epochs import Epochs
-from lsu_mesh.mesh.estimation.inconsistency import explains
 from lsu_mesh.mesh.estimation.open_loop import OpenLoop
+from lsu_mesh.mesh.estimation.step_data import StepData
+from lsu_mesh.mesh.estimation.time_update import predict_step
 from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, SOUND
 from lsu_mesh.mesh.messages import Base, Fused, Input, Reference
 from lsu_mesh.mesh.sets import to_support
@@ -38,7 +40,8 @@ class Start:
 class RestartSearch:
     """Remembers the newest sound set of each fusion, and finds one that meets the data."""
 
-    def __init__(self, epochs: Epochs) -> None:
+    def __init__(self, configuration: Configuration, epochs: Epochs) -> None:
+        self._configuration = configuration
         self._epochs = epochs
         self._fused: dict[str, Fused] = {}
 
@@ -53,15 +56,15 @@ class RestartSearch:
         self._fused.clear()
 
     def find(
-        self, engine: Filter, k: int, y: Vector, reach: OpenLoop, inputs: Mapping[int, Input], *, abandons: bool
+        self, engine: Filter, data: StepData, reach: OpenLoop, inputs: Mapping[int, Input], *, abandons: bool
     ) -> Start | None:
-        """A set of step k, before its data y (m,), that is sound and meets them; ``None`` where there is none.
+        """A set of the step, before its data, that is sound and meets them; ``None`` where there is none.
 
         In this order: a fused set carried forward, if it does not descend from the epoch that is left (``abandons``);
         the prior carried through every input (``reach``); the domain. Sets with a declared guarantee come first. The
         engine is only borrowed.
         """
-        before = engine.snapshot()
+        before, k = engine.snapshot(), data.k
         newest_first = sorted(self._fused.values(), key=lambda fused: -fused.step)
         carried_on = (self._carried(engine, fused, k, inputs=inputs, abandons=abandons) for fused in newest_first)
         starts = [start for start in carried_on if start is not None]
@@ -75,7 +78,7 @@ class RestartSearch:
         met = None
         for start in starts:
             engine.restore(start.set)
-            if explains(engine, y):
+            if data.agrees(engine):
                 met = start
                 break
         engine.restore(before)
@@ -90,19 +93,22 @@ class RestartSearch:
         if abandons and self._epochs.is_descendant(fused):
             return None
         used: list[Reference] = []
+        earlier: Vector | None = None
         try:
             engine.reset(to_support(fused.support))
         except InconsistentData:  # it is empty: whoever sent it was wrong
             return None
         for j in range(fused.step, k):
-            u = inputs.get(j)
-            if engine.model.input_count and u is None:
+            message = inputs.get(j)
+            if engine.model.input_count and message is None:
                 return None
+            u = None if message is None else np.array(message.u)
             try:
-                engine.predict(None if u is None else np.array(u.u))
+                predict_step(engine, self._configuration, j, u, earlier)
             except (InconsistentData, UnboundedSupport):
                 return None
-            used += [] if u is None else [u.reference]
+            used += [] if message is None else [message.reference]
+            earlier = u
         return Start(
             set=engine.snapshot(),
             base=fused.reference,

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from lsu_mesh.mesh.estimation.held_set import Held
-from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Prediction, Reference
+from lsu_mesh.mesh.estimation.time_update import Origin
+from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction, Reference
 
 Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 
@@ -18,6 +19,10 @@ class Step:
 
     arrived: dict[str, Message] = field(default_factory=dict)
     """Newest message of each source."""
+    data: list[Measurement] = field(default_factory=list)
+    """Every measurement, in the order of arrival, without copies."""
+    origin: Origin | None = None
+    """The posterior of the step before, where data between the steps can be reached from it."""
     input: Input | None = None
     before: Held | None = None
     """What was held before the step's data, for rewinding."""
@@ -27,6 +32,22 @@ class Step:
     """Whether its data were combined once; they are never waited for again."""
     revision: int = -1
     published: Posterior | None = None
+
+    def takes(self, message: Measurement) -> bool:
+        """Note a measurement; False for one with the moment and the values of another of its sensor, a copy."""
+        content = (message.name, _moment(message), message.y)
+        if any((one.name, _moment(one), one.y) == content for one in self.data):
+            return False
+        self.data.append(message)
+        return True
+
+    def untimed(self, sensor: str) -> Measurement | None:
+        """What a sensor has sent of the step without a time of its own."""
+        return next((one for one in self.data if one.name == sensor and one.time_error_ns is None), None)
+
+
+def _moment(message: Measurement) -> tuple[int, int] | None:
+    return None if message.time_error_ns is None else (message.time_ns, message.time_error_ns)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.step_arrivals import StepArrivals
 from lsu_mesh.mesh.estimation.step_record import Step
-from lsu_mesh.mesh.messages import Input, Message
+from lsu_mesh.mesh.messages import Input, Measurement, Message
 
 SECOND = 1_000_000_000
 BEHIND = 32
@@ -46,6 +46,7 @@ class Timeline:
         self._max_steps = max(MAX_STEPS, 2 * configuration.cached)
         self._newest_input = 0
         self._dirty: int | None = None
+        self._saw_box: dict[int, set[int]] = {}
 
     # -- what came
 
@@ -70,10 +71,21 @@ class Timeline:
         self._newest_input = max(self._newest_input, message.step)
         if self.current is not None and message.step < self.current:
             self.do_again(message.step, step)
+        for k in self._saw_box.pop(message.step, ()):
+            if self.current is not None and self.is_over(k):
+                self.do_again(k, self.step(k))
+
+    def sees_box(self, k: int, j: int) -> None:
+        """Data of step k have seen the input box in place of the input of step j: when that comes, k is done again."""
+        self._saw_box.setdefault(j, set()).add(k)
 
     def arrived(self, k: int, source: str) -> Message | None:
         """What a source has sent for step k, as far as it is remembered."""
         return self._steps[k].arrived.get(source) if k in self._steps else None
+
+    def untimed(self, k: int, sensor: str) -> Measurement | None:
+        """What a sensor has sent for step k without a time of its own, as far as it is remembered."""
+        return self._steps[k].untimed(sensor) if k in self._steps else None
 
     # -- steps
 
@@ -115,6 +127,7 @@ class Timeline:
         """Be at step k, before its data; nothing before it is remembered."""
         self.current, self.is_combined = k, False
         self._forget_steps_before(k)
+        self.step(k).origin = None
 
     def advance(self) -> None:
         """To the next step."""
@@ -145,7 +158,7 @@ class Timeline:
     def never_rewind(self) -> None:
         """The sets before now must not be used again."""
         for step in self._steps.values():
-            step.before = None
+            step.before = step.origin = None
 
     def leave(self, first: int, since: int) -> None:
         """Be nowhere, as a peer that has listened since then, and forget what is before a step."""
@@ -159,3 +172,4 @@ class Timeline:
     def _forget(self, k: int) -> None:
         self._steps.pop(k, None)
         self.inputs.pop(k, None)
+        self._saw_box.pop(k, None)

@@ -24,6 +24,7 @@ from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.mesh.config.settings import Configuration, FilterSettings
 from lsu_mesh.mesh.estimation.epochs import Epochs
+from lsu_mesh.mesh.estimation.time_update import predict_step
 from lsu_mesh.mesh.messages import Fused, Input, Message, Prediction
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.model import LSUModel
@@ -94,7 +95,7 @@ class Transfer:
     def as_set(self, message: Prediction | Fused, k: int, engine: Filter, inputs: Mapping[int, Input]) -> Support:
         """The set of step k that a message stands for; ``InconsistentData`` for an empty strip."""
         if isinstance(message, Fused):
-            return carried(message, k, engine.model, inputs)
+            return carried(message, k, engine.model, configuration=self._configuration, inputs=inputs)
         return self._strip(message, engine) if self.way == "data-predictor" else to_support(message.support)
 
     def _strip(self, message: Prediction, engine: Filter) -> Support:
@@ -112,9 +113,13 @@ class Transfer:
         return engine.support.to_constrained_zonotope().meet_strips(target.C, middle, radius)
 
 
-def carried(message: Fused, k: int, model: LSUModel, inputs: Mapping[int, Input]) -> Orthotope:
+def carried(
+    message: Fused, k: int, model: LSUModel, configuration: Configuration, inputs: Mapping[int, Input]
+) -> Orthotope:
     """The fused box of a step, carried to step k by the model; ``InconsistentData`` where it leaves the domain."""
-    box = LSUO(model, Orthotope(message.lower, message.upper))
+    box, earlier = LSUO(model, Orthotope(message.lower, message.upper)), None
     for j in range(message.step, k):
-        box.predict(np.array(inputs[j].u) if model.input_count else None)
+        u = np.array(inputs[j].u) if model.input_count else None
+        predict_step(box, configuration, j, u, earlier)
+        earlier = u
     return Orthotope(*box.bounds())

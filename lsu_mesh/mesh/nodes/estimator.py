@@ -14,21 +14,18 @@ import numpy as np
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.estimation.held_set import HeldSet
 from lsu_mesh.mesh.estimation.step_record import Combined, Step, published_content
-from lsu_mesh.mesh.estimation.timeline import Timeline
+from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.warm_up import warm_up
-from lsu_mesh.mesh.messages import Base, Bounds, Input, Message, Posterior, Reference, SupportMessage
-from lsu_mesh.mesh.nodes.node import SECOND, Complaint, Node
-from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key, start_keys
-from lsu_mesh.mesh.sets import to_message, to_support
-from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.support import Support
+from lsu_mesh.mesh.messages import Bounds, Input, Measurement, Message, Posterior, SupportMessage
+from lsu_mesh.mesh.nodes.node import Complaint
+from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key
+from lsu_mesh.mesh.nodes.starting import START_GRACE, About, StartingNode
+from lsu_mesh.mesh.sets import to_message
 
-About = dict[str, str | int | float | None]
-START_GRACE = SECOND // 2
-"""How long a late joiner listens to the past before it chooses where to start."""
+__all__ = ["START_GRACE", "Estimator"]
 MAX_AT_ONCE = 1024
 """Steps done in one tick, the next tick goes on; more only where more than this would be left."""
 MAX_MESSAGES = 32
@@ -37,25 +34,16 @@ MAX_USED = 2048
 """So many references since the last publication and a step is published all the same: receivers refuse longer lists."""
 
 
-class Estimator(Node):
+class Estimator(StartingNode):
     """A node that holds one set per step."""
 
     def __init__(
         self, configuration: Configuration, name: str, boot: str, engine: Filter, sources: tuple[str, ...]
     ) -> None:
-        super().__init__(configuration, name, boot)
-        self.sources = sources
-        lists_inputs = configuration.input_box is not None
-        self.held = HeldSet(engine, f"{self.role}/{name}", boot, lists_inputs=lists_inputs)
-        self.timeline = Timeline(configuration, self.history, self.remembered)
+        super().__init__(configuration, name, boot, engine=engine, sources=sources)
         self._source_timeouts = SourceTimeouts(configuration, self.subscriptions(), sources)
         self._has_more = False
         """Whether the last tick has left steps that may be ready."""
-        self._candidate: Posterior | None = None
-        self._waiting = ""
-        self._counts: dict[str, float] = dict.fromkeys(("late", "rewinds", "contradictions", "behind", "resets"), 0)
-        self._remarks: list[Message] = []
-        """Events of a time update."""
         self.last_posterior: Posterior | None = None
         self.absent: set[str] = set()
         """Sources that are known to be gone and are not waited for."""
@@ -66,16 +54,6 @@ class Estimator(Node):
     @abstractmethod
     def deadline(self) -> int:
         """How long to wait for a step's sources after its first sign, in nanoseconds."""
-
-    @property
-    @abstractmethod
-    def history(self) -> int:
-        """How many steps back a late message may rewind."""
-
-    @property
-    def remembered(self) -> int:
-        """How many steps back inputs are kept, so that all of ``history`` can be done again."""
-        return self.history
 
     @abstractmethod
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
@@ -89,6 +67,14 @@ class Estimator(Node):
         """Bounds of the set after the data, as they are published."""
         return self.engine.bounds()
 
+    def is_complete(self, k: int, step: Step, source: str) -> bool:
+        """Whether a source that is there has sent all of step k."""
+        return source in step.arrived
+
+    def lacks_input(self, k: int, step: Step, now: int) -> str:
+        """What input the step's data see and is still waited for; empty where there is none."""
+        return ""
+
     def content(self) -> tuple[object, ...]:
         """What a posterior says besides its set and makes it worth telling again."""
         return ()
@@ -99,22 +85,14 @@ class Estimator(Node):
 
     # -- messages in
 
-    @property
-    def engine(self) -> Filter:
-        """The filter that holds the set."""
-        return self.held.engine
-
-    @property
-    def current(self) -> int | None:
-        """The step that the estimator is at; None before it has started."""
-        return self.timeline.current
-
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""
         self._source_timeouts.received(source, now)
         step = self.timeline.see(message.step, now)
         if step is None:
             self._counts["late"] += 1
+            return
+        if isinstance(message, Measurement) and not step.takes(message):
             return
         step.arrived[source] = message
         if self.current is not None and self.timeline.is_over(message.step):
@@ -134,13 +112,6 @@ class Estimator(Node):
             return [self.event("WARN", "input-changed", text, now=now, step=message.step, about=about)]
         return []
 
-    def take_candidate(self, message: Posterior) -> None:
-        """Note a sound set of the mesh from which a late joiner may start."""
-        if message.src == f"{self.role}/{self.name}":
-            self.held.epochs.continue_from(message.epoch)
-        if message.status in ("ok", "predicted") and (self._candidate is None or message.step > self._candidate.step):
-            self._candidate = message
-
     # -- the course of steps
 
     def advance(self, now: int) -> list[Message]:
@@ -156,7 +127,11 @@ class Estimator(Node):
             k = self.current
             step = self.timeline.step(k)
             if not self.timeline.is_combined:
+                self._waiting = ""
                 if not self._is_ready(k, step, now):
+                    break
+                self._waiting = self.lacks_input(k, step, now)
+                if self._waiting:
                     break
                 messages += self._close(k, step, now)
             if not self._predict(k, step, now):
@@ -178,11 +153,12 @@ class Estimator(Node):
         return max(MAX_AT_ONCE, self.timeline.arrivals.newest - self.current - MAX_AT_ONCE)
 
     def _is_ready(self, k: int, step: Step, now: int) -> bool:
-        if step.closed or all(name in step.arrived or name in self.absent for name in self.sources):
+        if step.closed or all(name in self.absent or self.is_complete(k, step, name) for name in self.sources):
             return bool(step.closed or step.arrived or self.timeline.arrivals.newest > k)
-        return self._is_overdue(k, now)
+        return self.is_overdue(k, now)
 
-    def _is_overdue(self, k: int, now: int) -> bool:
+    def is_overdue(self, k: int, now: int) -> bool:
+        """Whether the deadline of step k has passed."""
         sign = self.timeline.arrivals.of(k)
         return sign is not None and now >= sign + self.deadline
 
@@ -192,6 +168,8 @@ class Estimator(Node):
         if self.current is None:
             first = self.timeline.first_evidence
             return None if first is None else first + START_GRACE
+        if self._waiting and self.configuration.input_box is None:
+            return None
         sign = self.timeline.arrivals.of(self.current)
         waits = not self.timeline.is_combined or self.configuration.input_box is not None
         return sign + self.deadline if sign is not None and waits else None
@@ -236,27 +214,38 @@ class Estimator(Node):
 
     def _predict(self, k: int, step: Step, now: int) -> bool:
         """Time update to step k + 1; False where the input is still missing."""
-        u: Vector | Orthotope | None = None
+        u: Drive = None
         if self.engine.model.input_count:
             if step.input is not None:
                 u = np.array(step.input.u)
-            elif self.configuration.input_box is not None and self._is_overdue(k, now):
+            elif self.configuration.input_box is not None and self.is_overdue(k, now):
                 u = self.configuration.input_box
             else:
                 is_late = self.timeline.arrivals.newest > k
                 self._waiting = f"input of step {k} ({input_key(self.configuration)})" if is_late else ""
                 return False
         self._waiting = ""
-        self.held.predict_reach(k, u, step.input)
-        if not self._predict_set(k, u, now):
+        earlier = self._earlier_input(k)
+        self.held.predict_reach(k, u, earlier, message=step.input)
+        if self.configuration.continuous is not None:
+            self.timeline.step(k + 1).origin = None if self.held.unsound else Origin(self.engine.snapshot(), u)
+        if not self._predict_set(k, u, earlier, now=now):
             return False
         self.timeline.advance()
         return True
 
-    def _predict_set(self, k: int, u: Vector | Orthotope | None, now: int) -> bool:
+    def _earlier_input(self, k: int) -> Drive:
+        """What drove the step before, where inputs may act late: it is one that the set is made from."""
+        message = self.timeline.inputs.get(k - 1) if self.configuration.input_delay_ns else None
+        if message is None:
+            return None
+        self.held.record_used([message.reference])
+        return np.array(message.u)
+
+    def _predict_set(self, k: int, u: Drive, earlier: Drive, *, now: int) -> bool:
         """Time update of the set; one that leaves the domain was wrong, one that outgrows all numbers says nothing."""
         try:
-            self.engine.predict(u)
+            predict_step(self.engine, self.configuration, k, u, earlier)
         except (InconsistentData, UnboundedSupport) as error:
             words = f"the prediction from step {k} failed: {error}"
             if not self.start_without_data(k + 1, abandons=True):
@@ -277,95 +266,8 @@ class Estimator(Node):
             self._counts["rewinds"] += 1
             self.held.restore(step.before)
 
-    # -- where to start
-
-    def _start(self, now: int) -> bool:
-        """Choose the first step and the set that surely holds its state."""
-        evidence = self.timeline.first_evidence
-        if evidence is None:
-            return False
-        first = self.timeline.steps()[0][0]
-        if first > 1 and now < evidence + START_GRACE:
-            return False
-        if (first == 1 and self._start_from_prior(1)) or self._start_from_candidate() or self._start_from_prior(first):
-            return True
-        domain = self.engine.model.domain
-        if domain is not None:
-            self._begin(first, domain, "domain")
-            return True
-        missing = next((j for j in range(1, first + 1) if self._input_missing(j)), first)
-        inputs = f"the inputs since step {missing} ({input_key(self.configuration)})"
-        self._waiting = f"a sound set to start from ({start_keys(self)}), or {inputs}"
-        return False
-
-    def _start_from_candidate(self) -> bool:
-        candidate = self._candidate
-        if candidate is None or self.held.epochs.is_abandoned(candidate) or self._input_missing(candidate.step):
-            return False
-        try:
-            self._begin(candidate.step, to_support(candidate.support), candidate.reference)
-        except InconsistentData:  # it is empty: whoever sent it was wrong
-            self._candidate = None
-            return False
-        self.held.add_dependency(candidate)
-        return True
-
-    def _start_from_prior(self, first: int) -> bool:
-        if any(self._input_missing(j) for j in range(1, first)):
-            return False
-        self._begin(1, self.configuration.prior, "prior", restarted=False)
-        self.held.reach.begin(self.configuration.prior)
-        return True
-
-    def _input_missing(self, k: int) -> bool:
-        if self.engine.model.input_count == 0 or self.configuration.input_box is not None:
-            return False
-        return not self.timeline.has_input(k)
-
-    def _begin(self, k: int, support: Support, base: Base, *, restarted: bool = True) -> None:
-        """Begin at step k, with a set that surely holds its state; ``restarted``: in the middle of a run."""
-        self.held.begin(support, base, restarted=restarted)
-        self._waiting = ""
-        self.timeline.begin(k)
-
-    def _start_over(self, k: int, why: str, now: int) -> None:
-        """Nothing is known behind step k: join again there, like a peer that starts late."""
-        self.join_again(k + 1, now)
-        self._counts["resets"] += 1
-        text = f"{why}; starting again behind it"
-        self._remarks.append(self.event("ERROR", "started-over", text, now=now, step=k, about={"step": k}))
-
-    def join_again(self, first: int, since: int) -> None:
-        """Forget what is before a step and start from there, as a peer that has listened since then."""
-        self.timeline.leave(first, since)
-        self._candidate = None
-        self.held.reach.lose()
-
-    def start_without_data(self, k: int, *, abandons: bool) -> bool:
-        """Hold what holds the state of step k whatever was measured; False, and nothing changes, without any."""
-        start = self.held.start_without_data(k)
-        if start is None:
-            return False
-        support, base, used = start
-        self.engine.reset(support)
-        if abandons:
-            self.abandon_epoch("")
-        self.start_from(base, used)
-        return True
-
-    def abandon_epoch(self, why: str) -> None:
-        """Tell all who relied on the own sets not to; ``why`` the engine holds nothing that may be believed now."""
-        self.held.abandon_epoch(why)
-        self._counts["resets"] += 1
-        self.timeline.never_rewind()
-
-    def start_from(self, base: Base, used: tuple[Reference, ...] = ()) -> None:
-        """Note that the engine now holds a set made from ``base`` and ``used`` alone."""
-        self.held.start_from(base, used)
-        self.timeline.never_rewind()
-
     def warm_up(self) -> None:
-        warm_up(self.engine, self.configuration.input_box)
+        warm_up(self.engine, self.configuration)
 
     # -- what is said of the node
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
@@ -15,13 +14,15 @@ from lsu_mesh.mesh.estimation.filter_step import (
     RejectedTransfer,
     contradiction_rule,
     filter_step,
-    stack,
 )
-from lsu_mesh.mesh.estimation.inconsistency import Dropped
+from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
 from lsu_mesh.mesh.estimation.message_fields import described, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.received_data import ReceivedData
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
+from lsu_mesh.mesh.estimation.step_data import BEFORE_PRIOR, StepData, Unused
 from lsu_mesh.mesh.estimation.step_record import Combined, Step
 from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, Transfer
+from lsu_mesh.mesh.measurement_time import is_timed
 from lsu_mesh.mesh.messages import (
     Fused,
     Input,
@@ -32,8 +33,11 @@ from lsu_mesh.mesh.messages import (
     Suggestion,
     SupportMessage,
 )
-from lsu_mesh.mesh.nodes.estimator import About, Estimator
+from lsu_mesh.mesh.nodes.estimator import Estimator
+from lsu_mesh.mesh.nodes.filter_events import dropped_event
 from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.nodes.source_timeout import input_key
+from lsu_mesh.mesh.nodes.starting import About
 from lsu_mesh.mesh.sets import to_message
 
 
@@ -55,10 +59,12 @@ class FilterNode(Estimator):
             engine=make_engine(settings, model, configuration.prior),
             sources=settings.sensors,
         )
+        self.held.limit_guarantee(declared_guarantee(configuration, settings))
+        self._received = ReceivedData(configuration, settings.sensors, self.timeline, settings.kind)
         self._sensor_of_row = [sensor for sensor in settings.sensors for _ in configuration.sensors[sensor].C]
         self._inconsistent: set[int] = set()
         """Steps in a row, up to the current one, whose data contradicted the set."""
-        self._restart_search = RestartSearch(self.held.epochs)
+        self._restart_search = RestartSearch(configuration, self.held.epochs)
         self._is_tested = True
         """Whether data of a later step have agreed with the set of the mesh that the node started from."""
         self._started_at = 0
@@ -113,44 +119,63 @@ class FilterNode(Estimator):
             self.take_candidate(message)
 
     def _receive_measurement(self, message: Measurement, now: int) -> list[Message]:
-        first = self.timeline.arrived(message.step, message.name)
+        if message.step < 1:
+            self._received.count(Unused(message, BEFORE_PRIOR))
+            return []
+        first = None if is_timed(message) else self.timeline.untimed(message.step, message.name)
         if first is None:
             self.take(message.name, message, now)
-        elif isinstance(first, Measurement) and first.y != message.y:
+            if message.step <= self.timeline.arrivals.newest:  # not from the future
+                self._received.note(message)
+        elif first.y != message.y:
             text = f"{message.name} sent step {message.step} again with another value; the first counts"
             about: About = {"sensor": message.name, "step": message.step}
             return [self.event("WARN", "measurement-changed", text, now=now, step=message.step, about=about)]
         return []
+
+    def is_complete(self, k: int, step: Step, source: str) -> bool:
+        return self._received.is_complete(k, step, source)
+
+    def lacks_input(self, k: int, step: Step, now: int) -> str:
+        j = self._received.missing_input(k, step, lambda: self.is_overdue(k, now))
+        return "" if j is None else f"input of step {j} ({input_key(self.configuration)})"
+
+    def counters(self) -> dict[str, float]:
+        return super().counters() | self._received.counts
 
     # -- one step
 
     def combine(self, k: int, step: Step, now: int) -> tuple[Combined, list[Message]]:
         self._factor = 1.0
         adopted = self._adopt(k, now)
-        measured = self._measured(step)
-        y = stack(self.configuration, self.sources, measured)
-        missing = [name for name in self.sources if name not in step.arrived]
-        used = [message for message in measured.values() if any(value is not None for value in message.y)]
-        origin = min((message.origin_ns for message in used), default=None)
-        messages = [*adopted, *self._repair(k, y, now)]
+        data = self._received.gather(k, step, self.engine.model.r)
+        missing = [name for name in self.sources if not data.has(name)]
+        messages = [*adopted, *self._repair(data, now)]
+        if step.origin is None:  # another set is held than that which was carried on from the step before
+            data = self._received.at_start(data)
+        origin = min((one.message.origin_ns for one in data.data), default=None)
+        nothing = Combined("inconsistent", used=[], missing=missing, origin=origin, cause=self.held.unsound)
         if self.held.unsound:
-            return Combined(
-                status="inconsistent", used=[], missing=missing, origin=origin, cause=self.held.unsound
-            ), messages
-        outcome, told = self._update(k, step, y, now)
+            return nothing, messages
+        outcome, told = self._update(data, step, now)
         messages += told
         if self.held.unsound:  # the data are not in the set: it is the one from before, of which nothing is believed
-            return Combined(
-                status="inconsistent", used=[], missing=missing, origin=origin, cause=str(outcome.error)
-            ), messages
+            return replace(nothing, cause=str(outcome.error)), messages
+        if step.origin is None:
+            data = self._received.at_start(data)
         for message in outcome.transfers:
             self.held.add_dependency(message)
             if self._transfer.way == "data-predictor":
                 self.held.downgrade_guarantee("none")
-        references = [message.reference for message in (*outcome.transfers, *used)]
+        used = [
+            *data.seen,
+            *(one.message.reference for one in data.inside),
+            *(message.reference for message in outcome.transfers),
+            *(one.message.reference for one in data.at_end),
+        ]
         return Combined(
             status=outcome.status,
-            used=references,
+            used=used,
             missing=missing,
             origin=origin,
             cause=self._cause(outcome),
@@ -173,18 +198,13 @@ class FilterNode(Estimator):
         about: About = {"step": k, "epoch": self.held.epochs.number, "source": message.src, "factor": message.factor}
         return [self.event("WARN", "bounds-adopted", text, now=now, step=k, about=about)]
 
-    def _measured(self, step: Step) -> dict[str, Measurement]:
-        """What the sensors have sent of a step, in the order of their names."""
-        arrived = {name: step.arrived.get(name) for name in self.sources}
-        return {name: message for name, message in arrived.items() if isinstance(message, Measurement)}
-
-    def _update(self, k: int, step: Step, y: Vector, now: int) -> tuple[FilterOutcome, list[Message]]:
+    def _update(self, data: StepData, step: Step, now: int) -> tuple[FilterOutcome, list[Message]]:
         """The step's transfers and data, and what the node does where they contradict the set."""
-        inputs, is_replay = self.timeline.inputs, step.transfers is not None
+        k, inputs, is_replay = data.k, self.timeline.inputs, step.transfers is not None
         before = self.engine.snapshot()
         outcome = filter_step(
             self.engine,
-            y,
+            data,
             self._transfers(k, step, inputs),
             as_set=lambda message: self._transfer.as_set(message, k, self.engine, inputs),
             rule=contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse",
@@ -199,13 +219,14 @@ class FilterNode(Estimator):
         self._counts["contradictions"] += 1
         if not self._is_tested:
             self.engine.restore(before)
-            return replace(outcome, transfers=(), gain=None), [*messages, *self._refuse_start(k, y, outcome.error, now)]
-        if outcome.dropped is None:
+            start = self._refuse_start(data, outcome.error, now)
+            return replace(outcome, transfers=(), gain=None), [*messages, *start]
+        if outcome.status == "ok":
             self._factor = outcome.factor
             self.held.downgrade_guarantee("learned")
             return outcome, [*messages, self._widened_event(k, outcome.error, now)]
         epoch = self.held.epochs.number
-        messages += self._drop(k, y, outcome.dropped, now)
+        messages += self._drop(data, outcome, now)
         if epoch != self.held.epochs.number:
             outcome = replace(outcome, transfers=(), gain=None)
         return outcome, messages
@@ -243,40 +264,28 @@ class FilterNode(Estimator):
         text = f"step {k}: {error}; r was widened by {self._factor:.4g} in this step, the set is no longer guaranteed"
         return self.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": self._factor})
 
-    def _drop(self, k: int, y: Vector, dropped: Dropped, now: int) -> list[Message]:
+    def _drop(self, data: StepData, outcome: FilterOutcome, now: int) -> list[Message]:
         """Tell what was left out because it contradicts the prediction; reset when it goes on."""
-        self._inconsistent.add(k)
-        messages = [
-            self._dropped_event(k, row, y, dropped=dropped, now=now) for row in (*dropped.alone, *dropped.together)
-        ]
+        self._inconsistent.add(data.k)
+        strips, dropped = list(outcome.strips), outcome.dropped
+        if dropped is not None and data.y is not None:
+            of_row, outputs = self._sensor_of_row, self.engine.model.outputs
+            strips += dropped.strips(data.y, lambda row: (of_row[row], outputs[row]))
+        messages = [dropped_event(self, data.k, strip, now=now) for strip in strips]
         if self.settings.on_inconsistency == "reset" and len(self._inconsistent) >= self.settings.reset_after:
-            messages.append(self._reset(k, y, now))
+            messages.append(self._reset(data, now))
         return messages
 
-    def _dropped_event(self, k: int, row: int, y: Vector, dropped: Dropped, now: int) -> Message:
-        sensor, output, gap = self._sensor_of_row[row], self.engine.model.outputs[row], dropped.gap(row, y)
-        lower, upper = float(dropped.band.lower[row]), float(dropped.band.upper[row])
-        is_alone = row in dropped.alone
-        if is_alone:
-            why = f"lies {gap:.4g} outside [{lower:.6g}, {upper:.6g}], all that the declared bounds allow"
-        else:
-            why = "contradicts the prediction together with the step's other measurements"
-        text = f"step {k}: {output} = {y[row]:.6g} of sensor {sensor} {why}; left out"
-        about: About = {
-            "sensor": sensor, "output": output, "step": k, "y": float(y[row]), "lower": lower, "upper": upper,
-            "gap": gap if is_alone else None,
-        }  # fmt: skip
-        return self.event("WARN", "contradiction", text, now=now, step=k, about=about)
-
-    def _reset(self, k: int, y: Vector, now: int) -> Message:
+    def _reset(self, data: StepData, now: int) -> Message:
         """Too many contradictions in a row: start again from something sound, or say that there is nothing."""
         self._inconsistent.clear()
-        count = self.settings.reset_after
-        start = self._start_again(k, y, abandons=True)
+        k, count = data.k, self.settings.reset_after
+        data = self._received.at_start(data)
+        start = self._start_again(data, abandons=True)
         if start is not None:
             self.abandon_epoch("")
             self._hold(start)
-            self.engine.update(y)
+            data.update(self.engine)
             text = f"step {k}: {count} steps in a row contradicted the set; started again from {start.words}"
             return self.event(
                 "ERROR", "reset", text, now=now, step=k, about={"step": k, "epoch": self.held.epochs.number}
@@ -287,20 +296,21 @@ class FilterNode(Estimator):
         )
         return self.event("ERROR", "reset-impossible", text, now=now, step=k, about={"step": k})
 
-    def _refuse_start(self, k: int, y: Vector, error: InconsistentData, now: int) -> list[Message]:
+    def _refuse_start(self, data: StepData, error: InconsistentData, now: int) -> list[Message]:
         """The set that the node started from misses the first data: it was not sound."""
         self._is_tested = True
-        event = self._abandon(k, y, f"the set that it started from contradicts the data: {error}", about={}, now=now)
+        data = self._received.at_start(data)
+        event = self._abandon(data, f"the set that it started from contradicts the data: {error}", about={}, now=now)
         if not self.held.unsound:
-            self.engine.update(y)
+            data.update(self.engine)
         return [event]
 
-    def _repair(self, k: int, y: Vector, now: int) -> list[Message]:
+    def _repair(self, data: StepData, now: int) -> list[Message]:
         """Leave an epoch that a source has abandoned; where there was nothing sound to start from, look again."""
-        source = self.held.epochs.abandoned
+        source, k = self.held.epochs.abandoned, data.k
         if source is not None:
-            return [self._abandon(k, y, f"{source} has abandoned its epoch", about={"source": source}, now=now)]
-        start = self._start_again(k, y, abandons=False) if self.held.unsound else None
+            return [self._abandon(data, f"{source} has abandoned its epoch", about={"source": source}, now=now)]
+        start = self._start_again(data, abandons=False) if self.held.unsound else None
         if start is None:
             return []
         self._hold(start)
@@ -311,9 +321,9 @@ class FilterNode(Estimator):
             )
         ]
 
-    def _abandon(self, k: int, y: Vector, why: str, about: About, now: int) -> Message:
+    def _abandon(self, data: StepData, why: str, about: About, now: int) -> Message:
         """A new epoch at once, so that others learn of it; held is something sound, or nothing that may be believed."""
-        start = self._start_again(k, y, abandons=True)
+        k, start = data.k, self._start_again(data, abandons=True)
         self.abandon_epoch(f"{why}; there is nothing sound to start again from")
         about = about | {"step": k, "epoch": self.held.epochs.number}
         if start is None:
@@ -328,10 +338,10 @@ class FilterNode(Estimator):
         if start.message is not None:
             self.held.add_dependency(start.message)
 
-    def _start_again(self, k: int, y: Vector, *, abandons: bool) -> Start | None:
-        """A set of step k, before its data, that is sound and meets them; ``None`` where there is none."""
-        inputs = self.timeline.inputs
-        return self._restart_search.find(self.engine, k, y, reach=self.held.reach, inputs=inputs, abandons=abandons)
+    def _start_again(self, data: StepData, *, abandons: bool) -> Start | None:
+        """A set of the step, before its data, that is sound and meets them; ``None`` where there is none."""
+        at_start, inputs = self._received.at_start(data), self.timeline.inputs
+        return self._restart_search.find(self.engine, at_start, reach=self.held.reach, inputs=inputs, abandons=abandons)
 
     def _start_from_candidate(self) -> bool:
         if not super()._start_from_candidate():

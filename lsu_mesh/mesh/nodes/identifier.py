@@ -19,8 +19,10 @@ from lsu_mesh.filters.window.structure import Structure
 from lsu_mesh.identification import learn_choice, smallest
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.measurement_time import is_of_its_step
 from lsu_mesh.mesh.messages import Input, Measurement, Message, Suggestion
 from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh.mesh.time_requirements import check_times
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
@@ -28,6 +30,8 @@ GIVEN_UP = 8
 """A step whose measurements have not all come when so many later ones have is looked at as it is."""
 MAX_WAITING = 1024
 """Steps beyond the window that are kept while something is waited for."""
+OFF_GRID = "off the grid"
+"""Measurements between the steps are not looked at, and counted by this."""
 ROUNDING = 1e-9
 """A factor above 1 by no more than this is one of the solver's rounding."""
 
@@ -40,6 +44,7 @@ class IdentifierNode(Node):
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         super().__init__(configuration, name, boot)
+        check_times(configuration, self.role, name)
         self.settings = configuration.identifiers[name]
         self._model = configuration.model(self.settings.sensors)
         """With the bounds in force."""
@@ -56,6 +61,9 @@ class IdentifierNode(Node):
 
     def receive(self, message: Message, now: int) -> list[Message]:
         if isinstance(message, Measurement):
+            if message.step < 1 or not is_of_its_step(self.configuration, message):
+                self._counts[OFF_GRID] = self._counts.get(OFF_GRID, 0) + 1
+                return []
             values = np.array([np.nan if value is None else value for value in message.y])
             self._y.setdefault(message.step, {}).setdefault(message.name, values)
             self._newest = max(self._newest, message.step)

@@ -7,13 +7,15 @@ fusion may rest on as many wrong sources as it allows.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
 
 from lsu_mesh.fusion.policies import POLICIES
-from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
 from lsu_mesh.mesh.messages import Fused, Guarantee, Measurement, Message, Posterior, Prediction, Reference
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.mesh.verification.archive import Archive, Unverifiable
@@ -127,20 +129,48 @@ class Containment:
         return self._measured[reference]
 
     def _noise_reason(self, message: Measurement) -> str:
-        """Names the sensor whose measurement is farther from the truth than its r, in exact arithmetic."""
+        """Names the sensor whose measurement is farther from the truth than its r, in exact arithmetic.
+
+        Nothing is said of data between the steps, or whose time is not known exactly: the truth of their moment is not
+        recorded.
+        """
         assert self.configuration is not None
         sensor, x = self.configuration.sensors[message.name], self.archive.truth.get(message.step)
-        if x is None:
+        if x is None or not self._is_of_its_step(message):
             return ""
-        for row, r, y, output in zip(sensor.C, sensor.r, message.y, sensor.outputs, strict=True):
-            if y is None:
-                continue
-            noise = Fraction(y) - sum((Fraction(c) * Fraction(v) for c, v in zip(row, x, strict=True)), Fraction(0))
-            if abs(noise) > Fraction(r):
-                words = f"step {message.step}: {output} is off by {abs(float(noise)):.6g}, r = {r:.6g}"
+        for row, r, y, output in zip(range(len(sensor.r)), sensor.r, message.y, sensor.outputs, strict=True):
+            noise = None if y is None else self._noise(sensor, row, Fraction(y), x=x, k=message.step)
+            if noise is not None and noise > Fraction(r):
+                words = f"step {message.step}: {output} is off by {float(noise):.6g}, r = {r:.6g}"
                 self.broken.setdefault(message.name, words)
                 return f"sensor {message.name}"
         return ""
+
+    def _is_of_its_step(self, message: Measurement) -> bool:
+        assert self.configuration is not None
+        on_grid = message.time_ns == self.configuration.grid.time_of(message.step)
+        return message.time_error_ns is None or (message.time_error_ns == 0 and on_grid)
+
+    def _noise(self, sensor: SensorSettings, row: int, y: Fraction, *, x: list[float], k: int) -> Fraction | None:
+        """``|y − C x − D u − d|``, of the nearest period; ``None`` where the input that it sees is not known."""
+        assert self.configuration is not None
+        expected = _product(sensor.C[row], x) + (Fraction(sensor.offset[row]) if sensor.offset else 0)
+        if sensor.D and any(sensor.D[row]):
+            message = self.archive.inputs.get(k)
+            if message is None or self.configuration.input_delay_ns:
+                return None
+            expected += _product(sensor.D[row], message.u)
+        noise = y - expected
+        period = sensor.period[row] if sensor.period else 0.0
+        if not period:
+            return abs(noise)
+        turns = round(noise / Fraction(period))
+        # a period such as 2π is the number that its double stands for: it is known to the double's spacing
+        return abs(noise - turns * Fraction(period)) - abs(turns) * Fraction(math.ulp(period))
+
+
+def _product(row: Sequence[float], x: Sequence[float]) -> Fraction:
+    return sum((Fraction(c) * Fraction(v) for c, v in zip(row, x, strict=True)), Fraction(0))
 
 
 def _spans_steps(message: Posterior, archive: Archive) -> bool:

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections import defaultdict
 from typing import NamedTuple
 
-from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.epochs import Epochs
 from lsu_mesh.mesh.estimation.fusion_step import OUTVOTED, fused_guarantee
+from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
 from lsu_mesh.mesh.estimation.held_set import weakest
 from lsu_mesh.mesh.messages import Fused, Guarantee, Mark, Message, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
@@ -124,7 +124,7 @@ class Lineage:
         if isinstance(message, Fused):
             return "declared"
         first = self._adopted.get((message.src, message.boot))
-        best = filter_class(self._configuration.filters[message.name].kind).guarantee
+        best = declared_guarantee(self._configuration, self._configuration.filters[message.name])
         return best if first is None or message.epoch < first else weakest((best, "learned"))
 
     def _base(self, message: Set) -> Posterior | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction, Suggestion
@@ -10,12 +11,16 @@ from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit
 
 @dataclass
 class Brought:
-    """The messages of one step, in the order applied: transfers or sources, measurements, then the input."""
+    """The messages of one step: transfers or sources, measurements, and the input that drives it on."""
 
     transfers: list[Prediction | Fused] = field(default_factory=list)
     measurements: list[Measurement] = field(default_factory=list)
     sources: list[Posterior] = field(default_factory=list)
     input: Input | None = None
+    known: dict[int, Input] = field(default_factory=dict)
+    """By step, the inputs that data of this step may have seen."""
+    earlier: Input | None = None
+    """The input before the one that drives it on."""
 
 
 def provenance_steps(posterior: Posterior, first: int, archive: Archive) -> dict[int, Brought]:
@@ -35,16 +40,41 @@ def provenance_steps(posterior: Posterior, first: int, archive: Archive) -> dict
         if not isinstance(message, Suggestion)  # no matter of a step's data
         and not (is_reach and isinstance(message, Input) and message.step < first)
     ]
+    known: dict[int, Input] = {}
+    at = first
     for i, message in enumerate(messages):
         k = message.step
-        if isinstance(message, Fused) and not isinstance(posterior, Fused):  # carried forward to a later step
+        if isinstance(message, Input):
+            known[k] = message
+            if _is_only_seen(messages, i, at):
+                continue
+            at = k + 1
+        elif isinstance(message, Fused) and not isinstance(posterior, Fused):  # carried forward to a later step
             later = (other.step for other in messages[i + 1 :] if not isinstance(other, Fused))
             k = next(later, posterior.step)
         if k not in steps or (isinstance(message, Input) and k == posterior.step):
             span = f"steps {first} to {posterior.step}"
             raise DoesNotFit("used", f"{message.topic} of {message.src} of step {message.step}", f"one of {span}")
         _add(steps[k], message, posterior)
+        if isinstance(message, Measurement) and len(known) > len(steps[k].known):
+            steps[k].known = dict(known)
+        if isinstance(message, Input):
+            steps[k].earlier = known.get(k - 1)
     return steps
+
+
+def _is_only_seen(messages: Sequence[Message], i: int, at: int) -> bool:
+    """Whether an input does not drive the set on from step ``at`` or a later one.
+
+    It is listed before data that see it, by their feedthrough or by the error of their time, or before the input of the
+    next step, which may act late.
+    """
+    k = messages[i].step
+    following = messages[i + 1] if i + 1 < len(messages) else None
+    if isinstance(following, Input) and k < at and following.step == k + 1:
+        return True
+    upcoming = next((other.step for other in messages[i + 1 :] if isinstance(other, Measurement | Prediction)), None)
+    return upcoming is not None and (k < at or k >= upcoming)
 
 
 def _add(brought: Brought, message: Message, posterior: Posterior) -> None:

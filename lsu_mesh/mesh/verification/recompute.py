@@ -13,13 +13,16 @@ import numpy as np
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
-from lsu_mesh.mesh.estimation.filter_step import contradiction_rule, filter_step, stack
+from lsu_mesh.mesh.estimation.filter_step import contradiction_rule, filter_step
 from lsu_mesh.mesh.estimation.fusion_step import OUTVOTED, Source, fusion_algorithm, fusion_engine, fusion_step
 from lsu_mesh.mesh.estimation.message_fields import described, described_box, finite_or_none, foretold
 from lsu_mesh.mesh.estimation.open_loop import MAX_LISTED, OpenLoop
+from lsu_mesh.mesh.estimation.step_data import DataOfSteps
+from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.transfer import Transfer
 from lsu_mesh.mesh.messages import Base, Bounds, Fused, Input, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.sets import to_message, to_support
@@ -63,6 +66,8 @@ class Recomputation(ABC):
         self._archive = archive
         self._engine = engine
         self._kept: OrderedDict[Reference, object] = OrderedDict()
+        self._origin: Origin | None = None
+        """The set of the step before, where the data between the steps are reached from it."""
 
     @property
     @abstractmethod
@@ -98,9 +103,9 @@ class Recomputation(ABC):
         if recorded.base is None:  # of an older peer, which does not say what it was made from
             before = self._archive.posterior_before(recorded)
             self._hold(before)
-            self._engine.predict(self._input(before.step))
-        elif self._hold_base(recorded, recorded.base) < recorded.step:
-            self._engine.predict(self._own_input(recorded))
+            predict_step(self._engine, self._configuration, before.step, self._input(before.step))
+        elif (k := self._hold_base(recorded, recorded.base)) < recorded.step:
+            predict_step(self._engine, self._configuration, k, *self._own_inputs(recorded))
         bounds = {} if recorded.bounds is None else {"bounds": self._noise_bounds()}
         return Recomputed({**foretold(self._engine), **bounds, "support": to_message(self._engine.support)})
 
@@ -111,13 +116,15 @@ class Recomputation(ABC):
         if found != number:
             raise OtherAlgorithm(f"{what} algorithm {found}, this is {number}")
 
-    def _own_input(self, recorded: Prediction) -> Vector | Orthotope | None:
-        """What drove a prediction on: the input that it used, or the input box."""
+    def _own_inputs(self, recorded: Prediction) -> tuple[Drive, Drive]:
+        """What drove a prediction on, the input that it used or the input box; and the input before, if it was used."""
         if not self._engine.model.input_count:
-            return None
-        inputs = [self._archive.find(reference, Input) for reference in recorded.used]
+            return None, None
+        used = [self._archive.find(reference, Input) for reference in recorded.used]
+        inputs = [message for message in used if message.step != recorded.step - 2]
+        earlier = next((np.array(message.u) for message in used if message not in inputs), None)
         if [message.step for message in inputs] == [recorded.step - 1] and not recorded.missing:
-            return np.array(inputs[0].u)
+            return np.array(inputs[0].u), earlier
         box = self._configuration.input_box
         if inputs or recorded.missing != ["input"]:
             words = f"the input of step {recorded.step - 1}"
@@ -126,7 +133,7 @@ class Recomputation(ABC):
             )
         if box is None:
             raise DoesNotFit("missing", recorded.missing, "nothing, because the configuration has no input_box")
-        return box
+        return box, earlier
 
     @abstractmethod
     def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Recomputed:
@@ -136,6 +143,7 @@ class Recomputation(ABC):
 
     def _hold_base(self, recorded: Posterior | Prediction, base: Base) -> int:
         """Hold the set that a message was made from; returns its step."""
+        self._origin = None
         if base == "prior":
             self._engine.reset(self._configuration.prior)
             return 1
@@ -165,10 +173,10 @@ class Recomputation(ABC):
                 raise Unverifiable(f"which inputs before step {k} were known in time is not told")
             found = [self._archive.find(reference, Input) for reference in recorded.used if reference[0] == Input.topic]
             known = {message.step: message for message in found if message.step < k}
-        reach = OpenLoop(self._engine.model)
+        reach = OpenLoop(self._configuration, self._engine.model)
         reach.begin(self._configuration.prior)
         for j in range(1, k):
-            reach.predict(self._driven(j, known.get(j)))
+            reach.predict(self._driven(j, known.get(j)), j, self._earlier(known.get(j - 1)))
         if reach.box is None:
             raise DoesNotFit("base", "the prior carried forward", "something that is bounded")
         return reach.box
@@ -193,7 +201,14 @@ class Recomputation(ABC):
     def _advance(self, k: int, brought: Brought) -> None:
         if self._engine.model.input_count and brought.input is None and self._configuration.input_box is None:
             raise DoesNotFit("used", f"no input of step {k}", "one, because the model has inputs and no input_box")
-        self._engine.predict(self._driven(k, brought.input))
+        u = self._driven(k, brought.input)
+        if self._configuration.continuous is not None:
+            self._origin = Origin(self._engine.snapshot(), u)
+        predict_step(self._engine, self._configuration, k, u, self._earlier(brought.earlier))
+
+    def _earlier(self, message: Input | None) -> Drive:
+        """The input before, where inputs may act late."""
+        return np.array(message.u) if message is not None and self._configuration.input_delay_ns else None
 
     def _input(self, k: int) -> Vector | Orthotope | None:
         return self._driven(k, self._archive.inputs.get(k))
@@ -221,6 +236,7 @@ class FilterRecomputation(Recomputation):
         engine = make_engine(settings, configuration.model(settings.sensors), configuration.prior)
         super().__init__(configuration, archive, engine)
         self._transfer = Transfer(configuration, settings)
+        self._data_of_steps = DataOfSteps(configuration, settings.sensors, settings.kind)
         self._declared = engine
         self._adopted: dict[str, dict[int, Filter]] = {}
         """By process, the epoch at which bounds were adopted and the filter that goes by them."""
@@ -259,14 +275,14 @@ class FilterRecomputation(Recomputation):
         return self._settings.kind, self._engine.algorithm
 
     def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Recomputed:
-        given = {message.name: message for message in brought.measurements}
-        foreign = sorted(given.keys() - set(self._settings.sensors))
+        foreign = sorted({message.name for message in brought.measurements} - set(self._settings.sensors))
         if foreign:
             raise DoesNotFit("used", f"sensors {', '.join(foreign)}", f"those of {self._settings.name}")
-        y = stack(self._configuration, self._settings.sensors, given)
+        r = self._engine.model.r
+        data = self._data_of_steps.gather(k, brought.measurements, r, origin=self._origin, known=brought.known)
         rule = contradiction_rule(self._settings.on_inconsistency)
         outcome = filter_step(
-            self._engine, y, brought.transfers, as_set=lambda message: self._as_set(message, k), rule=rule
+            self._engine, data, brought.transfers, as_set=lambda message: self._as_set(message, k), rule=rule
         )
         if outcome.rejected:
             one = outcome.rejected[0]

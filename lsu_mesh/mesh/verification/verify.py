@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +12,8 @@ import msgspec
 
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Fused, Message, Prediction
+from lsu_mesh.mesh.measurement_time import placed
+from lsu_mesh.mesh.messages import Fused, Measurement, Message, Prediction, Refused
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.claims import Claims
 from lsu_mesh.mesh.verification.containment import Containment
@@ -52,7 +54,7 @@ def verify(configuration: Configuration, messages: Iterable[Message]) -> Verific
 
     ``configuration`` is that of the recorded run.
     """
-    archive = Archive(messages)
+    archive = Archive(_placed(configuration, messages))
     recomputations: dict[str, Recomputation] = {}
     found = Verification(containment=Containment.of(configuration, archive))
     claims = Claims(configuration, archive)
@@ -66,6 +68,16 @@ def verify(configuration: Configuration, messages: Iterable[Message]) -> Verific
     claims.check_processes()
     found.false_claims, found.unproved = claims.false, claims.unproved
     return found
+
+
+def _placed(configuration: Configuration, messages: Iterable[Message]) -> Iterator[Message]:
+    """The messages with the steps of their times, as peers take them; without measurements that peers refuse."""
+    for message in messages:
+        if isinstance(message, Measurement) and message.name in configuration.sensors:
+            with suppress(Refused):
+                yield placed(configuration, message)
+        else:
+            yield message
 
 
 def _recomputation(configuration: Configuration, archive: Archive, recorded: Message) -> Recomputation:

@@ -39,7 +39,7 @@ def test_r_is_widened_by_the_smallest_factor_that_explains_the_data(kind: type[F
     model, box, y = case(seed)
     engine = kind(model, box)  # type: ignore[call-arg]
     before = engine.snapshot()
-    factor = widen(engine, y)
+    factor = widen(engine, lambda factor: engine.update(y, factor * model.r))
     assert factor is not None
     smallest = smallest_factor(model, box, y)
     assert factor <= smallest * (1 + PRECISION) + 1e-9, "an emptiness that is proved late only asks for less"
@@ -54,5 +54,5 @@ def test_where_no_factor_explains_the_data_nothing_is_widened() -> None:
     model = LSUModel(np.eye(1), None, [[1.0]], [0.0], [0.0])
     engine = LSUO(model, Orthotope([0.0], [1.0]))
     before = engine.support
-    assert widen(engine, np.array([5.0])) is None
+    assert widen(engine, lambda factor: engine.update([5.0], factor * model.r)) is None
     assert np.array_equal(engine.support.bounds(), before.bounds())

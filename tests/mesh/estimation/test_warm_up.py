@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -42,7 +43,7 @@ for other in (Parallelotope([0.0] * 3, 5.0 * np.eye(3)), box, node.engine.suppor
     node.engine.reset(other)
     node.engine.predict(np.zeros(1))
 node.held.reach.begin(box)
-node.held.reach.predict(np.zeros(1))
+node.held.reach.predict(np.zeros(1), 1)
 print(sorted(loaded() - known))
 """
 
@@ -59,5 +60,6 @@ def test_a_state_that_leaves_its_domain_in_the_rehearsal_ends_only_that() -> Non
     model = LSUModel(A=[[2.0]], B=None, C=[[1.0]], rho=[0.1], r=[0.5], domain=Orthotope([0.0], [9.0]))
     engine = LSUO(model, Orthotope([4.0], [5.0]))
     before = np.array(engine.bounds())
-    warm_up(engine, None)
+    demo_like = SimpleNamespace(input_box=None, has_one_model=True, continuous=None, input_delay_ns=0)
+    warm_up(engine, demo_like)  # type: ignore[arg-type]
     assert np.array_equal(before, engine.bounds())

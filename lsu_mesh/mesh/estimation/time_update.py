@@ -1,0 +1,39 @@
+"""Time updates of a mesh, from t_k to t_{k+1}: by its one model, by that of the step, or by its continuous model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.held_inputs import HeldInputs
+from lsu_mesh.filters.held_inputs import Input as Drive
+from lsu_mesh.filters.timed_data import carry
+from lsu_mesh.mesh.config.settings import Configuration
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The posterior of the step before, from which the data between the two steps are reached."""
+
+    set: object
+    """Snapshot of the engine that holds it."""
+    u: Drive
+    """What drove the step before: the input, or the box of all inputs."""
+
+
+def predict_step(engine: Filter, configuration: Configuration, k: int, u: Drive, earlier: Drive = None) -> None:
+    """Time update of the set of x(t_k) with u, and with ``earlier``, the input before it, where u may act late.
+
+    Raises what :meth:`Filter.predict` does.
+    """
+    if configuration.has_one_model:
+        engine.predict(u)
+        return
+    flow = configuration.flow(k)
+    if flow is None or not configuration.input_delay_ns or not flow.input_count:
+        engine.predict(u, model=configuration.stretch_model(k))
+        return
+    start, end = configuration.grid.time_of(k), configuration.grid.time_of(k + 1)
+    before = configuration.input_box if earlier is None else earlier
+    held = HeldInputs([start], [u], before=before, delay_ns=configuration.input_delay_ns)
+    carry(engine, flow, start, end_ns=end, inputs=held)

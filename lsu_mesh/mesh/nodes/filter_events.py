@@ -1,0 +1,24 @@
+"""What a filter node tells people of its steps."""
+
+from __future__ import annotations
+
+from lsu_mesh.mesh.estimation.inconsistency import DroppedStrip
+from lsu_mesh.mesh.messages import Message
+from lsu_mesh.mesh.nodes.node import Node
+
+
+def dropped_event(node: Node, k: int, strip: DroppedStrip, *, now: int) -> Message:
+    """A measured value that was left out, its sensor, its moment where it has one, and by how much it misses."""
+    if strip.is_alone:
+        why = f"lies {strip.gap:.4g} outside [{strip.lower:.6g}, {strip.upper:.6g}], all that the declared bounds allow"
+    else:
+        why = "contradicts the prediction together with the step's other measurements"
+    when = "" if strip.time_ns is None else f" at {strip.time_ns} ns"
+    text = f"step {k}: {strip.output} = {strip.y:.6g} of sensor {strip.sensor}{when} {why}; left out"
+    about: dict[str, str | int | float | None] = {
+        "sensor": strip.sensor, "output": strip.output, "step": k, "y": strip.y, "lower": strip.lower,
+        "upper": strip.upper, "gap": strip.gap if strip.is_alone else None,
+    }  # fmt: skip
+    if strip.time_ns is not None:
+        about["time_ns"] = strip.time_ns
+    return node.event("WARN", "contradiction", text, now=now, step=k, about=about)
