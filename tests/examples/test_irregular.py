@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import sys
 from collections.abc import Iterator
 from fractions import Fraction
@@ -59,7 +60,7 @@ def test_every_report_is_true_and_the_car_keeps_its_bound(data: ModuleType, seed
     assert max(map(abs, errors)) > Fraction(2, 5)
     moments = [Fraction(k, 50) for k in range(1, 3000)]
     speeds = [course.at(moment)[1] for moment in moments]
-    assert max(abs(b - a) for a, b in zip(speeds, speeds[1:], strict=False)) <= Fraction(3, 50)
+    assert max(abs(b - a) for a, b in itertools.pairwise(speeds)) <= Fraction(3, 50)
 
 
 def test_the_library_holds_the_car_at_every_report(data: ModuleType) -> None:
