@@ -4,10 +4,10 @@ BIN := .venv/bin
 READY := .venv/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test lint soak bench example-adsb clean
+.PHONY: help setup run test lint soak bench example-adsb example-irregular clean
 
 help: ## list the commands
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-14s %s\n", $$1, $$2}'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-18s %s\n", $$1, $$2}'
 
 setup: $(READY) ## make the environment in .venv and compile the kernels
 
@@ -42,6 +42,9 @@ bench: $(READY) ## speed of filters and hulls beside other libraries, as ratios
 
 example-adsb: $(READY) ## the altitude of a real aircraft through the mesh
 	@$(BIN)/python examples/adsb/run.py
+
+example-irregular: $(READY) ## a car whose reports come at any moment, at their times and on the nearest step
+	@$(BIN)/python examples/irregular/run.py
 
 clean: ## remove the environment, caches and recordings
 	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis runs build dist

@@ -1,4 +1,6 @@
-"""From a flight of the package ``traffic`` to a CSV file with one row per state vector: time, altitude (empty = none).
+"""From a flight of the package ``traffic`` to a CSV file with one row per state vector.
+
+Its columns: time; measured, the middle of the second before it, in which a new report was made; altitude (empty: none).
 
     python convert.py aircraft_carrier aircraft_carrier.csv
 
@@ -42,9 +44,9 @@ def convert(flight: str, out: Path) -> tuple[float, int, int]:
     rows = reports = 0
     with out.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["time", "altitude"])
+        writer.writerow(["time", "measured", "altitude"])
         for seconds, altitude in new_reports(vectors):
-            writer.writerow([f"{seconds:.0f}", "" if altitude is None else f"{altitude:g}"])
+            writer.writerow([f"{seconds:.0f}", f"{seconds - 0.5:.1f}", "" if altitude is None else f"{altitude:g}"])
             rows += 1
             reports += altitude is not None
     return vectors[0]["timestamp"] / 1000, rows, reports

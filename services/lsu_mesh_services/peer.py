@@ -6,6 +6,7 @@ import gc
 import socket
 import sys
 from collections.abc import Iterable
+from dataclasses import replace
 
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Message, encode, encoding
@@ -31,6 +32,7 @@ def run_node(node: Node, settings: SessionSettings, stop: Stop) -> int:
     node.warm_up()
     gc.collect()
     gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
+    settings = replace(settings, cache=settings.cache * node.messages_per_step)
     with Bus(settings, clock) as bus:
         peer = Peer(node, bus, clock)
         peer.declare()

@@ -16,10 +16,13 @@ from lsu_mesh.array_types import Matrix
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.identification import Explanation, explain, report
 from lsu_mesh.mesh.config import Configuration
-from lsu_mesh.mesh.config.measurement_files import read_playback
 from lsu_mesh.mesh.config.problem import nearest
+from lsu_mesh.mesh.data_files.spans import duration_text
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
+from lsu_mesh.mesh.nodes.played_rows import PlayedRows
+from lsu_mesh.mesh.nodes.recorded_inputs import recorded_inputs
+from lsu_mesh.mesh.nodes.time_fields import goes_to_nearest
 from lsu_mesh_services.configuration import load_or_explain, print_warnings
 from lsu_mesh_services.exit_codes import FAILURE, NOT_MET, OK, USAGE
 from lsu_mesh_services.played_files import accounts_or_explain
@@ -60,7 +63,12 @@ def _data(
     configuration: Configuration, options: argparse.Namespace
 ) -> tuple[list[str], Matrix, Matrix | None, int]:  # fmt: skip
     """Names of the sensors, outputs (T, m), inputs (T − 1, p), and the step of the first row."""
-    measured, inputs = _recorded(options.recording) if options.recording else (_played(configuration), {})
+    if not configuration.has_one_model:
+        raise NoData(f"{options.file}: the bounds of equal steps are looked for, which needs one discrete model")
+    if options.recording:
+        measured, inputs = _recorded(configuration, options.recording)
+    else:
+        measured, inputs = _played(configuration), _played_inputs(configuration)
     names = [name for name in sorted(configuration.sensors) if name in measured]
     names = [name for name in names if options.sensors is None or name in options.sensors]
     if not names:
@@ -84,24 +92,57 @@ def _data(
 
 def _played(configuration: Configuration) -> dict[str, Rows]:
     """Values by step of each sensor that plays a file."""
-    mesh, played = configuration.mesh, {}
+    played: dict[str, dict[int, Iterable[float | None]]] = {}
     for name, sensor in configuration.sensors.items():
-        if sensor.file is not None:
-            rows = read_playback(sensor.file, mesh.dt, mesh.start_time)
-            played[name] = {int(step): list(values) for step, values in zip(rows.steps, rows.values, strict=True)}
-    return {name: rows for name, rows in played.items() if rows}
+        if sensor.file is None:
+            continue
+        rows = PlayedRows(configuration, name)
+        for k in range(rows.first, rows.last + 1):
+            for row in rows.of(k):
+                _add(played.setdefault(name, {}), configuration, name, k, time=(row.time_ns, row.error_ns), y=row.y)
+    return dict(played)
 
 
-def _recorded(path: str) -> tuple[dict[str, Rows], Rows]:
-    """Measurements by sensor and step, and inputs by step; the first of each counts."""
+def _played_inputs(configuration: Configuration) -> Rows:
+    plant = configuration.plant
+    return {} if plant is None or plant.file is None else recorded_inputs(configuration, plant.file)
+
+
+def _add(
+    by_step: dict[int, Iterable[float | None]], configuration: Configuration, name: str, k: int, *,
+    time: tuple[int, int], y: Iterable[float | None],
+) -> None:  # fmt: skip
+    """One measurement of a step; raises :class:`NoData` where it is of another moment, or not the only one."""
+    sensor, (time_ns, error_ns) = configuration.sensors[name], time
+    off = abs(time_ns - configuration.grid.time_of(k)) + error_ns
+    what = ""
+    if off and not goes_to_nearest(configuration, sensor):
+        what = f"lies up to {duration_text(off)} from step {k}"
+    elif k in by_step:
+        if np.array_equal(np.array([*by_step[k]], dtype=float), np.array([*y], dtype=float), equal_nan=True):
+            return  # a copy
+        what = f"is not the only one of step {k}"
+    if what:
+        raise NoData(
+            f"{configuration.path}: a measurement of {name} {what}, and bounds are looked for by steps: choose a dt "
+            'and a start_time that fit the data, or put them on the nearest step with off_grid = "nearest"'
+        )
+    by_step[k] = y
+
+
+def _recorded(configuration: Configuration, path: str) -> tuple[dict[str, Rows], Rows]:
+    """Measurements by sensor and step, and inputs by step; the first input of each counts."""
     from lsu_mesh_services.recording.read import read_raw
 
-    measured: dict[str, dict[int, list[float | None]]] = {}
+    measured: dict[str, dict[int, Iterable[float | None]]] = {}
     inputs: dict[int, list[float | None]] = {}
     for raw in read_raw(Path(path)):
         message = _decoded(raw.key, raw.payload)
-        if isinstance(message, Measurement):
-            measured.setdefault(message.name, {}).setdefault(message.step, message.y)
+        if isinstance(message, Measurement) and message.name in configuration.sensors:
+            at = configuration.grid.time_of(message.step)
+            time = (at, 0) if message.time_error_ns is None else (message.time_ns, message.time_error_ns)
+            rows = measured.setdefault(message.name, {})
+            _add(rows, configuration, message.name, message.step, time=time, y=message.y)
         elif isinstance(message, Input):
             inputs.setdefault(message.step, list(message.u))
     return dict(measured), inputs

@@ -8,9 +8,9 @@ import sys
 import threading
 import time
 
+from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.problem import nearest
-from lsu_mesh.mesh.data_files import DataFileError
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.schedule import Schedule
 from lsu_mesh_services.configuration import load_or_explain
@@ -29,11 +29,7 @@ def main(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return USAGE
-    try:
-        return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
-    except DataFileError as error:  # only the sensor that plays a file reads it whole
-        print(error, file=sys.stderr)
-        return USAGE
+    return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
 
 
 def _run(configuration: Configuration, options: argparse.Namespace) -> int:
@@ -42,9 +38,14 @@ def _run(configuration: Configuration, options: argparse.Namespace) -> int:
         from lsu_mesh_services.recorder import run_recorder
 
         return run_recorder(configuration, options.record, settings, stop=options.stop, serve_port=options.serve)
+    try:
+        node = make_node(configuration, options)
+    except LsuMeshError as error:  # its file, which nobody else reads whole, or what it cannot do with this mesh
+        print(error, file=sys.stderr)
+        return USAGE
     from lsu_mesh_services.peer import run_node
 
-    return run_node(make_node(configuration, options), settings, options.stop)
+    return run_node(node, settings, options.stop)
 
 
 def _schedule(options: argparse.Namespace, rate: float) -> Schedule:

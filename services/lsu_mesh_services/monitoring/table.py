@@ -86,9 +86,9 @@ def _shown(value: float | None, form: str, unit: str = "") -> str:
 
 
 def share(inside: float | None) -> str:
-    """A share in percent, 100 % only where it is exactly that."""
+    """A share in percent, 100 % only where it is exactly that; words where there is no truth to hold."""
     if inside is None:
-        return "–"
+        return "no truth"
     return "100 %" if inside == 1.0 else f"{min(inside * 100, 99.99):.2f} %"
 
 

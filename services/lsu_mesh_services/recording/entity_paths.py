@@ -33,6 +33,7 @@ from functools import lru_cache
 
 import rerun as rr
 
+from lsu_mesh.mesh.access import truth_is_known
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.settings import SensorSettings
 from lsu_mesh.mesh.messages import Measurement, Message, Posterior, Prediction, Suggestion, Truth
@@ -105,8 +106,8 @@ class EntityPaths:
 
     @property
     def truth_is_known(self) -> bool:
-        """Whether there is a simulated plant; real measurements come without the truth."""
-        return self.configuration.plant is not None
+        """Whether a sensor is simulated; real measurements come without the truth."""
+        return truth_is_known(self.configuration)
 
     def check(self, message: Message) -> None:
         """Raise ``ValueError`` where a message does not fit the mesh: it would spoil the batch of the others."""

@@ -14,6 +14,7 @@ from typing import Any
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.write import to_toml
+from lsu_mesh.mesh.data_files.spans import seconds_text
 from lsu_mesh.mesh.messages import Input, Measurement, Posterior, Truth
 from lsu_mesh_services.recording.entity_paths import outputs_of, told_apart
 from lsu_mesh_services.recording.read import Received, Recording
@@ -21,6 +22,10 @@ from lsu_mesh_services.recording.read import Received, Recording
 Row = dict[str, Any]
 MEASUREMENTS = "measurements"
 INPUTS = "inputs.csv"
+RESERVED = ("step", "time", "time_ns")
+"""Columns of a sensor's file besides its outputs."""
+KEPT = ("C", "r", "outputs", "D", "offset", "period", "time_error", "rate", "off_grid", "grid_tolerance")
+"""Keys of a sensor that hold for its recorded data, too."""
 
 
 def export(recording: Recording, folder: Path, form: str) -> list[Path]:
@@ -58,6 +63,7 @@ def _estimate(
         "kind": message.kind,
         "step": message.step,
         "time": message.step * configuration.mesh.dt,
+        "time_ns": configuration.grid.time_of(message.step),
         "arrival_ns": one.arrival_ns,
         "latency_ms": (one.arrival_ns - message.origin_ns) * 1e-6,
         "revision": message.revision,
@@ -80,32 +86,31 @@ def _estimate(
 
 
 def write_playable(recording: Recording, folder: Path, replayed: Configuration | None = None) -> list[Path]:
-    """Measurements and inputs as CSV files, and a configuration that plays them; the first of a step counts.
+    """Measurements and inputs as CSV files, and a configuration that plays them; the first input of a step counts.
 
+    A sensor that was measured off the grid, or several times a step, is played by its times in nanoseconds, any other
+    by steps. Where messages declare larger errors of their times than the sensor, all are played with the largest.
     ``replayed`` is the configuration whose filters and fusions are to run; default: the recorded one.
     """
     configuration = replayed or recording.configuration
     values = copy.deepcopy(dict(configuration.values))
     values.pop("network", None)  # where the recorded mesh was is no place for another one
-    measured: dict[str, dict[int, Measurement]] = {}
+    measured: dict[str, list[Measurement]] = {}
     inputs: dict[int, Input] = {}
     for message in (one.message for one in recording.received):
         if isinstance(message, Measurement):
-            measured.setdefault(message.name, {}).setdefault(message.step, message)
+            measured.setdefault(message.name, []).append(message)
         elif isinstance(message, Input):
             inputs.setdefault(message.step, message)
     files = []
-    for name, by_step in sorted(measured.items()):
+    for name, messages in sorted(measured.items()):
         if name not in configuration.sensors:
             continue
-        parts = tuple(output.part for output in outputs_of(configuration.sensors[name]))
-        labels = [f"output {part}" if part in ("step", "time") else part for part in parts]
-        ordered = sorted(by_step.items())
-        rows = [{"step": k, "time": m.time_ns * 1e-9, **dict(zip(labels, m.y, strict=True))} for k, m in ordered]
-        files.append(_write_csv(rows, folder / MEASUREMENTS / f"{name}.csv"))
-        kept = {key: value for key, value in values["sensors"][name].items() if key in ("C", "r", "outputs")}
-        played = {"file": f"{MEASUREMENTS}/{name}.csv", "step": "step", "columns": labels}
-        values["sensors"][name] = kept | played
+        table, path = values["sensors"][name], folder / MEASUREMENTS / f"{name}.csv"
+        rows, keys = playable_rows(configuration, name, messages)
+        files.append(_write_csv(rows, path))
+        kept = {key: value for key, value in table.items() if key in KEPT}
+        values["sensors"][name] = kept | {"file": f"{MEASUREMENTS}/{name}.csv"} | keys
     if inputs:
         parts = told_apart(configuration.base_model.inputs)
         labels = [f"input {part}" if part == "step" else part for part in parts]
@@ -116,6 +121,27 @@ def write_playable(recording: Recording, folder: Path, replayed: Configuration |
     text = folder / "mesh.toml"
     text.write_text(to_toml(values), encoding="utf-8")
     return [*files, text]
+
+
+def playable_rows(
+    configuration: Configuration, name: str, messages: Sequence[Measurement]
+) -> tuple[list[Row], dict[str, Any]]:
+    """The rows of a sensor's file, and the keys of its table that play them."""
+    grid, sensor = configuration.grid, configuration.sensors[name]
+    labels = [f"output {output.part}" if output.part in RESERVED else output.part for output in outputs_of(sensor)]
+    timed = [(grid.time_of(one.step) if one.time_error_ns is None else one.time_ns, one) for one in messages]
+    timed.sort(key=lambda entry: entry[0])
+    is_by_step = all(time == grid.time_of(one.step) for time, one in timed)
+    is_by_step &= len({one.step for one in messages}) == len(messages)
+    rows = [
+        {"step": one.step, "time": seconds_text(time), "time_ns": time, **dict(zip(labels, one.y, strict=True))}
+        for time, one in timed
+    ]
+    keys: dict[str, Any] = {"step": "step"} if is_by_step else {"time": "time_ns", "time_unit": "ns"}
+    error = max(one.time_error_ns or 0 for one in messages)
+    if error > sensor.time_error_ns:
+        keys["time_error"] = f"{error}ns"
+    return rows, keys | {"columns": labels}
 
 
 def _write(rows: Sequence[Row], path: Path) -> Path:

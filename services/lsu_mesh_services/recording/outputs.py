@@ -23,6 +23,7 @@ class Outputs:
         self._stream = stream
         self._timelines = timelines
         self._names = names
+        self._start_ns = names.configuration.grid.start_ns
         self._measured: defaultdict[Output, list[tuple[Moment, float]]] = defaultdict(list)
         self._predicted: defaultdict[str, list[tuple[Moment, Prediction]]] = defaultdict(list)
         self._of_sensor: defaultdict[str, list[Output]] = defaultdict(list)
@@ -31,8 +32,9 @@ class Outputs:
         self._style(colors)
 
     def add_measurement(self, message: Measurement, arrival_ns: int) -> None:
-        """Measured outputs of one sensor; missing ones leave no point."""
-        moment = Moment(message.step, arrival_ns)
+        """Measured outputs of one sensor, at their own moment; missing ones leave no point."""
+        since = None if message.time_error_ns is None else message.time_ns - self._start_ns
+        moment = Moment(message.step, arrival_ns, since)
         for output, value in zip(self._of_sensor[message.name], message.y, strict=True):
             if value is not None:
                 self._measured[output].append((moment, value))

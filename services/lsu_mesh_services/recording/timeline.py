@@ -1,4 +1,7 @@
-"""The three timelines: ``step``, ``sim_time`` (step · dt) and ``wall_time`` (arrival at the recorder)."""
+"""The three timelines: ``step``, ``sim_time`` and ``wall_time`` (arrival at the recorder).
+
+``sim_time`` counts from t_0: step · dt, or the moment of a measurement that has one of its own.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,8 @@ class Moment(NamedTuple):
 
     step: int
     wall_ns: int
+    since_start_ns: int | None = None
+    """Its moment, counted from t_0; ``None``: that of its step."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,9 @@ class Timelines:
         steps = np.array([moment.step for moment in moments], dtype=np.int64)
         seconds = np.minimum(steps * self.dt, 9e9)  # 285 years; a step far beyond the run must not overflow
         simulated = np.rint(seconds * 1e9).astype(np.int64)
+        own = [(i, since) for i, (_, _, since) in enumerate(moments) if since is not None]
+        for i, since in own:
+            simulated[i] = min(max(since, -LAST_NS), LAST_NS)
         return [
             rr.TimeColumn(STEP, sequence=steps),
             rr.TimeColumn(SIM_TIME, duration=simulated.astype("timedelta64[ns]")),

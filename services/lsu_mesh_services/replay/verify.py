@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from lsu_mesh.mesh.access import truth_is_known
 from lsu_mesh.mesh.verification import Verification, verify
 from lsu_mesh_services.exit_codes import NOT_MET, OK
 from lsu_mesh_services.recording.read import Recording
@@ -111,7 +112,9 @@ def _first(found: Sequence[object]) -> list[str]:
 def _about_truth(report: Report) -> list[str]:
     containment = report.found.containment
     if not containment.archive.truth:
-        return ["the truth is not recorded: containment was not checked"]
+        if not truth_is_known(report.recording.configuration):
+            return ["no truth: no sensor is simulated, so that nobody knows whether the sets hold the state"]
+        return ["no truth: it is not recorded, so that containment was not checked"]
     lines = [f"{containment.holding} sets of steps whose truth is recorded hold it"]
     if containment.misses:
         lines.append(f"{len(containment.misses)} sets that must hold the truth miss it; first:")
