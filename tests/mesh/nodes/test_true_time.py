@@ -118,7 +118,7 @@ def three_sensors(configuration: Configuration, made: Scene, seconds: float) -> 
     sent = []
     for name, listed in times.items():
         for i, t in enumerate(t for t in listed if t < ends):
-            x = made.course.at(t)["c" == name]
+            x = made.course.at(t)[name == "c"]
             y = float(x) + float(rng.uniform(-0.49, 0.49))
             sent.append((t + 5 * MS, report(configuration, name, i, time_ns=t, y=[y])))
     return sent
