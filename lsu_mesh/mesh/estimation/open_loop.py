@@ -73,7 +73,7 @@ class OpenLoop:
         if self._lists_inputs and reference is not None and k <= MAX_LISTED:
             self._inputs[k] = reference
         try:
-            predict_step(self._engine, self._configuration, k, u, earlier)
+            predict_step(self._engine, self._configuration, k, u=u, earlier=earlier)
         except (UnboundedSupport, InconsistentData):
             self.lose()
 

@@ -120,6 +120,6 @@ def carried(
     box, earlier = LSUO(model, Orthotope(message.lower, message.upper)), None
     for j in range(message.step, k):
         u = np.array(inputs[j].u) if model.input_count else None
-        predict_step(box, configuration, j, u, earlier)
+        predict_step(box, configuration, j, u=u, earlier=earlier)
         earlier = u
     return Orthotope(*box.bounds())

@@ -245,7 +245,7 @@ class Estimator(StartingNode):
     def _predict_set(self, k: int, u: Drive, earlier: Drive, *, now: int) -> bool:
         """Time update of the set; one that leaves the domain was wrong, one that outgrows all numbers says nothing."""
         try:
-            predict_step(self.engine, self.configuration, k, u, earlier)
+            predict_step(self.engine, self.configuration, k, u=u, earlier=earlier)
         except (InconsistentData, UnboundedSupport) as error:
             words = f"the prediction from step {k} failed: {error}"
             if not self.start_without_data(k + 1, abandons=True):

@@ -204,7 +204,7 @@ class Recomputation(ABC):
         u = self._driven(k, brought.input)
         if self._configuration.continuous is not None:
             self._origin = Origin(self._engine.snapshot(), u)
-        predict_step(self._engine, self._configuration, k, u, self._earlier(brought.earlier))
+        predict_step(self._engine, self._configuration, k, u=u, earlier=self._earlier(brought.earlier))
 
     def _earlier(self, message: Input | None) -> Drive:
         """The input before, where inputs may act late."""
