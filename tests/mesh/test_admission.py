@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -121,15 +122,46 @@ def test_names_of_unknown_fields_do_not_fill_the_memory(admission: Admission, co
     assert len(admission.unknown_fields) == MAX_NAMES
 
 
-def test_a_measurement_without_a_step_is_a_message_and_is_not_admitted_yet(
-    admission: Admission, configuration: Configuration
-) -> None:
-    timed = payload(configuration, step=0, time_ns=7, time_error_ns=0)
+def test_a_measurement_without_a_step_gets_that_of_its_time(admission: Admission, configuration: Configuration) -> None:
+    timed = payload(configuration, step=0, time_ns=60_000_000, time_error_ns=0)
     message = decode("measurement", timed)
     assert isinstance(message, Measurement)
     assert (message.step, message.time_error_ns) == (0, 0)
-    assert admission.admit(KEY, timed) is None
-    assert admission.refused == {"step": 1}
+    placed = admission.admit(KEY, timed)
+    assert placed is not None
+    assert placed.step == 3
+
+
+def test_a_step_that_does_not_fit_the_time_is_refused(admission: Admission, configuration: Configuration) -> None:
+    assert admission.admit(KEY, payload(configuration, step=4, time_ns=60_000_000, time_error_ns=0)) is None
+    assert admission.refused == {"time": 1}
+
+
+def test_the_time_of_a_measurement_that_tells_no_error_is_not_read(
+    admission: Admission, configuration: Configuration
+) -> None:
+    message = admission.admit(KEY, payload(configuration, step=4, time_ns=60_000_000))
+    assert message is not None
+    assert message.step == 4
+
+
+@pytest.mark.parametrize(("time_ns", "error_ns"), [(60_000_003, 0), (60_000_000, 1)])
+def test_a_discrete_model_refuses_data_between_its_steps(
+    admission: Admission, configuration: Configuration, time_ns: int, error_ns: int
+) -> None:
+    between = payload(configuration, step=0, time_ns=time_ns, time_error_ns=error_ns)
+    assert admission.admit(KEY, between) is None
+    assert admission.refused == {"off the grid": 1}
+    assert "s1 at " in admission.last_refusal
+
+
+def test_data_within_the_tolerance_are_of_the_step(configuration: Configuration) -> None:
+    sensors = {"s1": replace(configuration.sensors["s1"], tolerance_ns=5)}
+    near = Admission(replace(configuration, sensors={**configuration.sensors, **sensors}), ["measurement"])
+    for seq, time_ns in enumerate((59_999_995, 60_000_005)):
+        message = near.admit(KEY, payload(configuration, seq=seq, step=0, time_ns=time_ns, time_error_ns=0))
+        assert message is not None
+        assert message.step == 3
 
 
 def test_several_measurements_of_one_step_are_admitted(admission: Admission, configuration: Configuration) -> None:

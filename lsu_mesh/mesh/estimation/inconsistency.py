@@ -66,7 +66,8 @@ def update_without_contradicting_strips(engine: Filter, y: Vector, r: Vector | N
 
     If none does alone, or the rest is contradictory too, all of the step is dropped. r (m,) and u as of the update.
     """
-    band = widened(engine.predict_output(u), r, engine.model.r)
+    band = engine.predict_output() if u is None else engine.predict_output(u)
+    band = widened(band, r, engine.model.r)
     outside = (y < band.lower) | (y > band.upper)
     alone = tuple(np.flatnonzero(outside).tolist())
     kept = np.where(outside, np.nan, y)
@@ -76,7 +77,7 @@ def update_without_contradicting_strips(engine: Filter, y: Vector, r: Vector | N
         together = rest
     elif rest:
         try:
-            engine.update(kept, r, u=u)
+            engine.update(kept, r) if u is None else engine.update(kept, r, u=u)
         except InconsistentData:
             together = rest
     return Dropped(alone, together, band)

@@ -94,7 +94,7 @@ class StepData:
         if self.y is not None:
             r = self.r if factor == 1.0 else factor * (engine.model.r if self.r is None else self.r)
             if not np.isnan(self.y).all():
-                engine.update(self.y, r, u=self.u)
+                update(engine, self.y, r, self.u)
             return
         before = engine.snapshot()
         try:
@@ -123,6 +123,14 @@ class StepData:
             return False
         engine.restore(before)
         return True
+
+
+def update(engine: Filter, y: Vector, r: Vector | None, u: Drive) -> None:
+    """Data update with y (m,); filters of other packages need not know of u where no output sees an input."""
+    if u is None:
+        engine.update(y, r)
+    else:
+        engine.update(y, r, u=u)
 
 
 class DataOfSteps:

@@ -35,8 +35,11 @@ def _warm_up_step(
 ) -> None:
     model = engine.model
     if model.output_count:
-        seen = None if model.D is None else np.zeros(model.input_count)
-        engine.update(engine.predict_output(seen).point, u=seen)
+        if model.D is None:
+            engine.update(engine.predict_output().point)
+        else:
+            seen = np.zeros(model.input_count)
+            engine.update(engine.predict_output(seen).point, u=seen)
     hull = engine.support.interval_hull()
     around = Parallelotope(hull.center, np.diag(np.maximum(hull.half_widths, 1.0)))
     across = Parallelotope(hull.center, 0.5 * around.generators @ np.triu(np.ones_like(around.generators)))

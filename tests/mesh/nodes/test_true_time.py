@@ -132,7 +132,7 @@ def shuffled(sent: list[tuple[int, Measurement]], seed: int, late: float, by_ns:
 def test_late_and_shuffled_data_end_in_the_same_sets_bit_by_bit(tmp_path: Path) -> None:
     made = car(1)
     configuration = body(tmp_path / "three.toml", made, dt=0.1, more=THREE)
-    filters = {name: replace(one, deadline=0.05) for name, one in configuration.filters.items()}
+    filters = {name: replace(one, deadline=0.2) for name, one in configuration.filters.items()}
     configuration = replace(configuration, filters=filters)
     sent = three_sensors(configuration, made, seconds=2.5)
     final = []
