@@ -1,6 +1,6 @@
 """From a flight of the package ``traffic`` to a CSV file with one row per state vector.
 
-Its columns: time; measured, the middle of the 1.4 s before it, in which a new report was made (README.md); altitude
+Its columns: time; measured, the middle of the 1.6 s before it, in which a new report was made (README.md); altitude
 (empty: none).
 
     python convert.py aircraft_carrier aircraft_carrier.csv
@@ -26,7 +26,7 @@ FLIGHTS = {
     "aircraft_carrier": "traffic/data/samples/military/aircraft_carrier.json.gz",
     "noisy_landing": "traffic/data/samples/noisy/noisy_landing.json.gz",
 }
-HALF_AGE = 0.7
+HALF_AGE = 0.8
 """Half of how old a report may be, in seconds: the smallest tenth by which |a| <= 8 ft/s² explains a flight."""
 DATA = Path(__file__).resolve().parent / "data"
 
