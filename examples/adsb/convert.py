@@ -49,7 +49,9 @@ def convert(flight: str, out: Path) -> tuple[float, int, int]:
         writer = csv.writer(file)
         writer.writerow(["time", "measured", "altitude"])
         for seconds, altitude in new_reports(vectors):
-            writer.writerow([f"{seconds:.0f}", f"{seconds - HALF_AGE:.1f}", "" if altitude is None else f"{altitude:g}"])
+            writer.writerow(
+                [f"{seconds:.0f}", f"{seconds - HALF_AGE:.1f}", "" if altitude is None else f"{altitude:g}"]
+            )
             rows += 1
             reports += altitude is not None
     return vectors[0]["timestamp"] / 1000, rows, reports
