@@ -1,6 +1,7 @@
 """From a flight of the package ``traffic`` to a CSV file with one row per state vector.
 
-Its columns: time; measured, the middle of the second before it, in which a new report was made; altitude (empty: none).
+Its columns: time; measured, the middle of the 1.6 s before it, in which a new report was made (README.md); altitude
+(empty: none).
 
     python convert.py aircraft_carrier aircraft_carrier.csv
 
@@ -25,6 +26,8 @@ FLIGHTS = {
     "aircraft_carrier": "traffic/data/samples/military/aircraft_carrier.json.gz",
     "noisy_landing": "traffic/data/samples/noisy/noisy_landing.json.gz",
 }
+HALF_AGE = 0.8
+"""Half of how old a report may be, in seconds: the smallest tenth by which |a| <= 8 ft/s² explains a flight."""
 DATA = Path(__file__).resolve().parent / "data"
 
 
@@ -46,7 +49,9 @@ def convert(flight: str, out: Path) -> tuple[float, int, int]:
         writer = csv.writer(file)
         writer.writerow(["time", "measured", "altitude"])
         for seconds, altitude in new_reports(vectors):
-            writer.writerow([f"{seconds:.0f}", f"{seconds - 0.5:.1f}", "" if altitude is None else f"{altitude:g}"])
+            writer.writerow(
+                [f"{seconds:.0f}", f"{seconds - HALF_AGE:.1f}", "" if altitude is None else f"{altitude:g}"]
+            )
             rows += 1
             reports += altitude is not None
     return vectors[0]["timestamp"] / 1000, rows, reports

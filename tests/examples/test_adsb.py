@@ -46,7 +46,7 @@ def noisy_landing(root: Path, tmp_path_factory: pytest.TempPathFactory, convert:
 @pytest.fixture
 def configuration(root: Path, tmp_path: Path) -> Configuration:
     """The example's configuration with a file of one row."""
-    (tmp_path / "one.csv").write_text("time,altitude\n1600120071,0\n")
+    (tmp_path / "one.csv").write_text("time,measured,altitude\n1600120071,1600120070.2,0\n")
     return load(root / "examples" / "adsb" / "adsb.toml", [f'sensors.baro.file="{tmp_path / "one.csv"}"'])
 
 
@@ -168,7 +168,7 @@ def reported(file: Path) -> dict[int, float]:
     """Reports by step; the first row is step 1."""
     rows = [line.split(",") for line in file.read_text().splitlines()[1:]]
     first = float(rows[0][0])
-    return {round(float(time) - first) + 1: float(altitude) for time, altitude in rows if altitude}
+    return {round(float(time) - first) + 1: float(altitude) for time, _, altitude in rows if altitude}
 
 
 def around(reports: dict[int, float], k: int) -> float:
