@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from lsu_mesh.filters.run_record import FilterRun
 
 
 class LsuMeshError(Exception):
-    """Base class of every error that ``lsu_mesh`` raises on purpose."""
+    """Base class of every error that ``lsu_mesh`` raises on purpose.
+
+    Attributes
+    ----------
+    run:
+        What :func:`lsu_mesh.run_filter` had of the rows before the one that failed; ``None`` for every other error.
+    """
+
+    run: FilterRun | None = None
 
 
 class ModelError(LsuMeshError, ValueError):

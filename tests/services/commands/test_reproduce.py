@@ -70,7 +70,7 @@ SHORT = {
     "p2006.experiment": {"QUICK_STEPS": 30, "QUICK_RUNS": 1},
     "p2014.experiment": {"QUICK_STEPS": 60, "QUICK_RUNS": 1},
     "p2018.experiment": {"QUICK_RUNS": 1},
-    "l2019.experiment": {"QUICK_STEPS": 20, "QUICK_RUNS": 1, "OVERLAP_RUNS": 1},
+    "l2019.experiment": {"QUICK_STEPS": 60, "QUICK_RUNS": 1},
     "p2023.experiment": {"QUICK_STEPS": 30, "QUICK_RUNS": 1},
 }
 """What makes a part of ``reproduce all --quick`` as short as it can be."""
