@@ -86,8 +86,8 @@ def test_a_scaled_copy_gives_the_scaled_sets_bit_by_bit(name: str, exponent: int
 def test_the_check_notices_a_bound_that_is_a_billionth_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
     honest = reduction.program_maxima
 
-    def shrunk(*program: object) -> Maxima:
-        found = honest(*program)  # type: ignore[arg-type]
+    def shrunk(*program: object, **sides: object) -> Maxima:
+        found = honest(*program, **sides)  # type: ignore[arg-type]
         return found._replace(values=found.values - 1e-9 * np.abs(found.values))
 
     monkeypatch.setattr(reduction, "program_maxima", shrunk)

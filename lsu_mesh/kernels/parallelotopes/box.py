@@ -17,7 +17,7 @@ from lsu_mesh.kernels.parallelotopes.strip_update import (
     middle,
 )
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
-from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, up
+from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, size_of_product, up
 from lsu_mesh.kernels.runtime.scratch import BODY, BOX, DELTA, STRIP, Scratch, row, square
 from lsu_mesh.kernels.runtime.unowned_views import block
 
@@ -41,16 +41,14 @@ def predict(
     for i in range(n):
         centre, magnitude, reach = 0.0, 0.0, 0.0
         for j in range(n):
-            term = A[i, j] * c[j]
-            centre += term
-            magnitude += abs(term)
-            reach += abs(A[i, j]) * q[j]
+            centre += A[i, j] * c[j]
+            magnitude += size_of_product(A[i, j], c[j])
+            reach += size_of_product(A[i, j], q[j])
         for j in range(p):
-            term = B[i, j] * u[j]
-            centre += term
-            magnitude += abs(term)
+            centre += B[i, j] * u[j]
+            magnitude += size_of_product(B[i, j], u[j])
         for j in range(k):
-            reach += abs(G[i, j]) * widths[j]
+            reach += size_of_product(G[i, j], widths[j])
         reach += gamma(n + p + 2) * magnitude
         reach += gamma(2 * n + p + k + 8) * reach
         if reach == 0.0:
