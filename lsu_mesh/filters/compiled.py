@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.inconsistency import known_to_last_bits, strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.validation import (
     KernelModel,
@@ -94,6 +94,10 @@ class CompiledFilter(Filter):
         used, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
         strips = plain_strips(used, arrays, y, r=r, u=u, image=self._image)
         state, status = self._cut(self._state, arrays.C, *strips)
+        if status > 0:
+            rounded = known_to_last_bits(arrays.C, *strips, self.bounds())
+            state, wider_status = self._cut(self._state, arrays.C, strips[0], rounded)
+            status = wider_status if wider_status <= 0 else status
         if status > 0:
             raise self._contradiction(used, arrays.C, *strips, status)
         self._accept(state, status)
