@@ -30,7 +30,7 @@ MAX_BROKEN = 1000
 class Broken(NamedTuple):
     """A report that contradicts the bounds and all reports before it: step (from 1), output (from 0), value.
 
-    ``gap``: by how much it misses; nan where only several reports of a step together do.
+    ``gap``: by how much it misses; 0 where only several reports of a step together do.
     """
 
     step: int
@@ -259,7 +259,7 @@ def report(found: Explanation) -> str:
     )
     words += [
         f"  step {b.step}: {model.outputs[b.output]} = {b.value:.6g} breaks them"
-        + (f" by {b.gap:.4g}" if np.isfinite(b.gap) else " together with others of the step")
+        + (f" by {b.gap:.4g}" if b.gap > 0.0 else " together with others of the step")
         for b in held.broken or ()
     ]
     words.append("bounds that explain data do not prove containment: call sets that are built on them learned")

@@ -99,7 +99,7 @@ class Table(NamedTuple):
     def records(self) -> list[dict[str, str | int | float | None]]:
         """One mapping per row, for JSON, with the columns of :meth:`csv`; numbers that are not finite become None."""
         titles = self._split_titles()
-        return [dict(zip(titles, map(_finite, self._split(row)), strict=True)) for row in self.rows]
+        return [dict(zip(titles, map(plain_number, self._split(row)), strict=True)) for row in self.rows]
 
     def _is_split(self, column: int) -> bool:
         return any(isinstance(row[column], Spread) for row in self.rows)
@@ -130,8 +130,12 @@ class Check(NamedTuple):
 
     @property
     def is_met(self) -> bool:
-        """Whether the number is reached."""
-        return self.measured <= self.limit if self.sense == "at most" else self.measured >= self.limit
+        """Whether the number is reached; never one of numpy's, which JSON does not know."""
+        return bool(self.measured <= self.limit if self.sense == "at most" else self.measured >= self.limit)
+
+    def record(self) -> dict[str, str | int | float | bool | None]:
+        """A mapping for JSON: the fields, and ``met``; numbers that are not finite become None."""
+        return {name: plain_number(value) for name, value in self._asdict().items()} | {"met": self.is_met}
 
     def __str__(self) -> str:
         verdict = "met" if self.is_met else "NOT MET"
@@ -175,5 +179,7 @@ def _text(cell: Cell, form: str) -> str:
     return f"{cell:{form}}" if isinstance(cell, float) else str(cell)
 
 
-def _finite(cell: str | int | float) -> str | int | float | None:
-    return None if isinstance(cell, float) and not math.isfinite(cell) else cell
+def plain_number(cell: str | int | float) -> str | int | float | None:
+    """A cell as JSON knows it: Python's own types, and None for a number that is not finite."""
+    own = cell.item() if isinstance(cell, np.generic) else cell
+    return None if isinstance(own, float) and not math.isfinite(own) else own

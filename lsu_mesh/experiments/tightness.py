@@ -37,7 +37,7 @@ FILTERS: dict[str, Callable[[LSUModel, Orthotope], Filter]] = {
     "LSUPB": LSUPB,
     "LSUCZ(12, 4)": lambda model, prior: LSUCZ(model, prior, 12, 4),
     "LSUCZ(20, 8)": LSUCZ,
-    "LSUCZ unreduced": lambda model, prior: LSUCZ(model, prior, None, None),
+    "LSUCZ unreduced": lambda model, prior: LSUCZ(model, prior, reduce=False),
     "ZonotopicKalman(15)": ZonotopicKalman,
 }
 MAX_UNREDUCED = 100

@@ -65,7 +65,7 @@ class FilterBank:
         self._filter = first
         self._model = model_list[0]
         self._models = _stack(model_list)
-        self._states = np.array([kind._enclose(checked_prior(model_list[0], prior)) for prior in prior_list])
+        self._states = np.array([first._start(checked_prior(model_list[0], prior)) for prior in prior_list])
         if len(self._states) != count:
             self._states = np.repeat(self._states, count, axis=0)
         self._threads = max(1, min(threads or os.cpu_count() or 1, count // MIN_SHARE))

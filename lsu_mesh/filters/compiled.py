@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, OutputPrediction
-from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.inconsistency import known_to_last_bits, strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.validation import (
     KernelModel,
@@ -45,7 +45,7 @@ class CompiledFilter(Filter):
         self._model = model
         self._arrays = kernel_model(model)
         self._work = self._scratch(self._arrays.G.shape[1])
-        self._state = self._enclose(checked_prior(model, prior))
+        self._state = self._start(checked_prior(model, prior))
 
     @staticmethod
     @abstractmethod
@@ -56,6 +56,10 @@ class CompiledFilter(Filter):
     @abstractmethod
     def _make_support(state: Matrix) -> Support:
         """The set that a state stands for."""
+
+    def _start(self, support: Support) -> Matrix:
+        """The state that holds ``support``, by this filter's options."""
+        return self._enclose(support)
 
     @property
     def model(self) -> LSUModel:
@@ -91,6 +95,10 @@ class CompiledFilter(Filter):
         strips = plain_strips(used, arrays, y, r=r, u=u, image=self._image)
         state, status = self._cut(self._state, arrays.C, *strips)
         if status > 0:
+            rounded = known_to_last_bits(arrays.C, *strips, self.bounds())
+            state, wider_status = self._cut(self._state, arrays.C, strips[0], rounded)
+            status = wider_status if wider_status <= 0 else status
+        if status > 0:
             raise self._contradiction(used, arrays.C, *strips, status)
         self._accept(state, status)
         return self.support
@@ -109,6 +117,8 @@ class CompiledFilter(Filter):
             filter_step.PREDICT, self.family, self.option, self._state, self._arrays.C, center, center,
             arrays.A, arrays.B, center, arrays.G, widths, state, work,
         )  # fmt: skip
+        if status > 0:
+            raise InconsistentData(f"the sets of {self.kind} are proved to have no point in common")
         if status == 0 and step_model.domain is not None:
             state, status = self._meet_box(state, step_model.domain)
             if status > 0:
@@ -131,7 +141,7 @@ class CompiledFilter(Filter):
         return max(0.0, before - self._log_volume(state)) if before > -math.inf else 0.0
 
     def reset(self, support: Support) -> None:
-        self._state = self._enclose(checked_prior(self._model, support))
+        self._state = self._start(checked_prior(self._model, support))
 
     @property
     def is_resumable(self) -> bool:

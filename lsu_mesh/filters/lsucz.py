@@ -29,6 +29,8 @@ LITTLE_GAIN = 0.03
 """Nats below which a transferred set is weighed against what the reduction of the intersection costs."""
 
 
+GENERATORS, GENERATORS_PER_STATE = 20, 3
+"""Generators of a set at least, and for each state, where the user states no limit."""
 MAX_EXACT_VOLUME = 3
 """Dimension up to which :meth:`LSUCZ.volume` enumerates vertices; ``support.volume()`` does so up to 6."""
 
@@ -51,11 +53,14 @@ class LSUCZ(Filter):
     model, prior:
         LSU model with n states; a set, or a pair (lower, upper), that holds x_1.
     max_generators, max_constraints:
-        Complexity of the posterior support (P2023, Algorithm 1); ``None`` is no limit, at least n generators. A
-        prediction has up to one generator per noise and state more, until the next data update.
+        Complexity of the posterior support (P2023, Algorithm 1): at least n generators, ``None`` stands for
+        ``max(20, 3 n)``; as many constraints, ``None`` is no limit. A prediction has up to one generator per noise and
+        state more, until the next data update.
     point:
         ``"hull"``: centre of the interval hull (Method 1); ``"nearest"``: the point of the support that is nearest to
         the centre of its generators' box (Method 2).
+    reduce:
+        ``False``: no limit of either kind, the set grows with every step.
 
     Raises
     ------
@@ -77,9 +82,10 @@ class LSUCZ(Filter):
         self,
         model: LSUModel,
         prior: Support | tuple[ArrayLike, ArrayLike],
-        max_generators: int | None = 20,
+        max_generators: int | None = None,
         max_constraints: int | None = 8,
         point: Literal["hull", "nearest"] = "hull",
+        reduce: bool = True,
     ) -> None:
         n = model.state_count
         if point not in ("hull", "nearest"):
@@ -90,7 +96,11 @@ class LSUCZ(Filter):
             raise ModelError(f"max_constraints must not be negative, it is {max_constraints}")
         self._model = model
         self._arrays = kernel_model(model)
-        self._limits = Limits(max_generators, max_constraints)
+        if max_generators is None:
+            max_generators = max(GENERATORS, GENERATORS_PER_STATE * n)
+            if reduce and max_generators > GENERATORS:  # it was GENERATORS for models of all sizes once
+                vars(self)["algorithm"] = max(2, type(self).algorithm)
+        self._limits = Limits(max_generators, max_constraints) if reduce else Limits(None, None)
         self._point_rule = point
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 

@@ -11,6 +11,7 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.filter import Guarantee
+from lsu_mesh.filters.validation import checked_prior
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.kernels.parallelotopes import parallelotope
 from lsu_mesh.model import LSUModel
@@ -48,22 +49,31 @@ class LSUP(CompiledFilter):
         one at a time, where that leaves less volume; ``"edges"``: the best n of all edges, n ≤ 6 (as ``"cgz"`` at a
         step whose unknown inputs leave more than 924 choices); ``"strips"``: the image, then the faces of the
         circumscribed box as strips.
+    box:
+        Whether a box is carried beside the parallelotope, by interval arithmetic over data and time updates and met
+        with each hull; :meth:`bounds` are then that box, and :attr:`point` the centre moved into it. They never forget
+        what was once known of a constant. The parallelotope takes nothing from the box.
 
     Raises ``ModelError`` on options or a prior that do not fit.
 
     A strip never makes the volume larger, but it may make the interval hull larger: the new edges can leave the old
-    set. Where the hull matters, use LSUPB. A flat set stays as thin as rounding allows, not thinner: its volume is
-    tiny, not 0.
+    set. The box beside it never follows; where the set itself should not either, use LSUPB. A flat set stays as thin
+    as rounding allows, not thinner: its volume is tiny, not 0.
 
     Source: Lainová et al. 2019, section 3.2; Vicino & Zappa 1996; Chisci, Garulli & Zappa 1996.
     """
 
     kind: ClassVar[str] = "LSUP"
     guarantee: ClassVar[Guarantee] = "declared"
+    algorithm: ClassVar[int] = 2
     family: ClassVar[int] = filter_step.PARALLELOTOPE
 
     def __init__(
-        self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], time_update: TimeUpdate = "image"
+        self,
+        model: LSUModel,
+        prior: Support | tuple[ArrayLike, ArrayLike],
+        time_update: TimeUpdate = "image",
+        box: bool = True,
     ) -> None:
         if time_update not in TIME_UPDATES:
             raise ModelError(f"time_update must be one of {', '.join(TIME_UPDATES)}, not {time_update!r}")
@@ -73,6 +83,7 @@ class LSUP(CompiledFilter):
                 f'time_update="edges" tries all combinations of edges, up to {MAX_EXHAUSTIVE_SIZE} states and noises; '
                 f'the model has {n} and {q}: use "cgz" or "strips"'
             )
+        self.has_box = bool(box)
         super().__init__(model, prior, option=TIME_UPDATES[time_update])
         self.time_update = time_update
 
@@ -82,20 +93,46 @@ class LSUP(CompiledFilter):
         A strip that takes the place of an own one can push the hull out. Where that happens the edges keep their
         directions and are shortened to what the intersection reaches along them, by verified linear programs.
         """
-        before, hull, volume = self._state, self.bounds(), self._log_volume(self._state)
+        before, hull, volume = self._state, self._hull(self._state), self._log_volume(self._state)
         gain = super().condition(support)
         if not self._widens(self._state, hull):
             return gain
-        self._state = before
+        box, self._state = self._state[len(hull[0]) + 1 :], before
         shortened = self._shortened(support)
         if shortened is None or self._widens(shortened, hull):
+            self._state = self._beside(before, box)
             return 0.0
-        self._state = shortened
+        self._state = self._beside(shortened, box)
         return max(0.0, volume - self._log_volume(shortened)) if volume > -np.inf else 0.0
+
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+        """Go on from the parallelotope, and from the box where one is carried, bit by bit."""
+        body = self._enclose(checked_prior(self._model, support))
+        self._state = np.vstack([body, lower, upper]) if self.has_box else body
+
+    def _start(self, support: Support) -> Matrix:
+        body = self._enclose(support)
+        return np.vstack([body, *support.bounds()]) if self.has_box else body
+
+    def _hull(self, state: Matrix) -> tuple[Vector, Vector]:
+        """Interval hull of the parallelotope alone."""
+        _, lower, upper, _ = self._describe(state[: self._model.state_count + 1])
+        return lower, upper
+
+    def _beside(self, state: Matrix, box: Matrix) -> Matrix:
+        """The parallelotope of a state, and this box (2, n), met with its hull, or none (0, n), beside it."""
+        body = state[: state.shape[1] + 1]
+        if not len(box):
+            return body
+        lower, upper = self._hull(body)
+        lower, upper = np.maximum(lower, box[0]), np.minimum(upper, box[1])
+        if (lower > upper).any():
+            raise InconsistentData("the set of LSUP and the transferred set have no point in common")
+        return np.vstack([body, lower, upper])
 
     def _widens(self, state: Matrix, hull: tuple[Vector, Vector]) -> bool:
         """Whether the hull of a state exceeds another one by more than rounding."""
-        _, lower, upper, _ = self._describe(state)
+        lower, upper = self._hull(state)
         rounding = ROUNDING * np.maximum(np.abs(hull[0]), np.abs(hull[1]))
         return bool((lower < hull[0] - rounding).any() or (upper > hull[1] + rounding).any())
 
@@ -121,4 +158,4 @@ class LSUP(CompiledFilter):
 
     @staticmethod
     def _make_support(state: Matrix) -> Parallelotope:
-        return Parallelotope.trusted(state[0], state[1:])
+        return Parallelotope.trusted(state[0], state[1 : state.shape[1] + 1])

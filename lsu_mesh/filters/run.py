@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,8 +13,10 @@ from lsu_mesh.errors import LsuMeshError, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.grid import OffGrid
-from lsu_mesh.filters.run_record import FilterRun, blank_run, named_row, store_output, store_set
+from lsu_mesh.filters.inconsistent_rows import OnInconsistency, RowRule
+from lsu_mesh.filters.run_record import FilterRun, blank_run, store_output, store_set
 from lsu_mesh.filters.timed_run import Models, Rows, run_rows
+from lsu_mesh.filters.validation import numbers
 from lsu_mesh.kernels import batch_run
 from lsu_mesh.model import ContinuousModel, LSUModel
 
@@ -29,6 +32,8 @@ def run_filter(
     dt_ns: int | None = None,
     rate: ArrayLike | None = None,
     off_grid: OffGrid = "refuse",
+    on_inconsistency: OnInconsistency = "raise",
+    volumes: bool | None = None,
 ) -> FilterRun:
     """Update with ``Y[k]`` and predict with ``U[k]`` for every row; afterwards the filter holds the last posterior.
 
@@ -37,9 +42,9 @@ def run_filter(
     filter:
         Holds the prior of the first row's state.
     Y, U:
-        (T, m), NaN for a missing output; (T, p), ``None`` for a model without inputs. The last row of U is not used
-        (T − 1 rows are enough) unless D ≠ 0. LSUO, LSUP and LSUPB run plain models in one compiled loop, with the same
-        bits as step by step.
+        (T, m), NaN or a masked entry for a missing output; (T, p), ``None`` for a model without inputs.
+        The last row of U is not used (T − 1 rows are enough) unless D ≠ 0. LSUO, LSUP and LSUPB run plain models in one
+        compiled loop, with the same bits as step by step.
     times:
         Times (T,) of the rows in whole nanoseconds, or ``datetime64``, not decreasing. The filter's model (or every
         model of ``models``) is one of a continuous model, and the set is carried over the true lengths: row k of the
@@ -53,12 +58,20 @@ def run_filter(
         Of a discrete model with times: the grid ``times[0] + k dt_ns``. A row off the grid is refused, unless ``rate``
         (m,), the bound of the noise-free |dy/dt| per second, widens it, or ``off_grid="nearest"``, by which the sets
         are no longer guaranteed. Row k of the result is then the set of its step.
+    on_inconsistency:
+        What to do with a row whose data are proved to miss the set. ``"raise"``; ``"hold"``: leave its data out;
+        ``"reset"``: start again from ``model.domain``, with its data; ``"widen"``: widen its r by the smallest factor,
+        to 1 %, that explains them, or hold where none does; the run then promises no guarantee. A prediction that
+        misses the domain is replaced by the domain, but with ``"raise"``. ``run.status`` tells what became of each row.
+    volumes:
+        ``None``: ``run.volumes`` is computed when it is first read, from the sets of the rows, which are kept until
+        then; ``True``: at once; ``False``: never, it is NaN, and no set is kept. (A compiled loop always has them.)
 
     Raises
     ------
     InconsistentData
-        Names the row; the filter is then left as it was before that step (row k's prediction, or where the prediction
-        from row k misses the domain, row k's posterior).
+        Names the row; ``error.run`` is the run of the rows before it. The filter is then left as it was before that
+        step (row k's prediction, or where the prediction from row k misses the domain, row k's posterior).
     ModelError
         Y, U, times or models have a wrong shape or entries, or a row is off the grid.
     """
@@ -69,39 +82,67 @@ def run_filter(
     needs_last = any((m.rates if isinstance(m, ContinuousModel) else m).D is not None for m in all_models)
     inputs = _inputs(U, len(outputs), filter.model.input_count, needs_last)
     run = blank_run(len(outputs), filter.model.state_count, filter.model.output_count, filter.guarantee)
-    if times is not None or models is not None:
-        rows = Rows(
-            Y=outputs,
-            U=inputs,
-            times=times,
-            models=models,
-            time_errors=time_errors,
-            dt_ns=dt_ns,
-            rate=rate,
-            off_grid=off_grid,
-        )
-        return run_rows(filter, rows, run)
-    if np.any(time_errors) or dt_ns is not None or rate is not None:
-        raise ModelError("time_errors, dt_ns and rate need times")
-    if isinstance(filter, CompiledFilter) and filter.has_compiled_loop:
-        row, where = filter.sweep(outputs, inputs, batch_run.Record(*(table[np.newaxis] for table in run)))
-        if where == batch_run.IN_UPDATE:
-            _update(filter, outputs, inputs, row)
-        elif where == batch_run.IN_PREDICT:
-            _predict(filter, inputs, row - 1)
-        return run
+    rule = RowRule(filter, run, on_inconsistency)
+    try:
+        if times is not None or models is not None:
+            rows = Rows(
+                Y=outputs,
+                U=inputs,
+                times=times,
+                models=models,
+                time_errors=time_errors,
+                dt_ns=dt_ns,
+                rate=rate,
+                off_grid=off_grid,
+                keeps_sets=volumes is not False,
+            )
+            run_rows(filter, rows, rule=rule, run=run)
+        elif np.any(time_errors) or dt_ns is not None or rate is not None:
+            raise ModelError("time_errors, dt_ns and rate need times")
+        elif isinstance(filter, CompiledFilter) and filter.has_compiled_loop:
+            _sweep(filter, outputs, inputs, rule=rule, run=run)
+        else:
+            run.filter = None if volumes is False else filter
+            _step(filter, outputs, inputs, rule=rule, run=run)
+    except LsuMeshError as error:
+        error.run = run.first(run.done)
+        raise
+    return run.complete() if volumes else run
+
+
+def _step(filter: Filter, Y: Matrix, U: Matrix, rule: RowRule, run: FilterRun) -> None:
+    """All rows, step by step."""
     is_plain = filter.model.has_plain_outputs  # filters of other packages need not know u then
-    for k in range(len(outputs)):
-        store_output(run, k, filter.predict_output() if is_plain else filter.predict_output(inputs[k]))
-        _update(filter, outputs, inputs, k)
+    for k in range(len(Y)):
+        store_output(run, k, filter.predict_output() if is_plain else filter.predict_output(U[k]))
+        rule.update(k, Y[k], u=U[k])
         store_set(run, k, filter)
-        if k + 1 < len(outputs):
-            _predict(filter, inputs, k)
-    return run
+        if k + 1 < len(Y):
+            rule.advance(k, partial(filter.predict, U[k] if U.shape[1] else None))
+
+
+def _sweep(filter: CompiledFilter, Y: Matrix, U: Matrix, rule: RowRule, run: FilterRun) -> None:
+    """All rows in the compiled loop, which stops at a contradiction and goes on after what the rule makes of it."""
+    tables, row = list(run), 0
+    run.status[:] = ["missing" if np.isnan(y).all() else "ok" for y in Y]
+    while row < len(Y):
+        record = batch_run.Record(*(table[np.newaxis, row:] for table in tables))
+        done, where = filter.sweep(Y[row:], U[row:], record)
+        row += done
+        run.done = row
+        if where == batch_run.IN_UPDATE:
+            rule.update(row, Y[row], u=U[row])
+            store_set(run, row, filter)
+            run.volumes[row] = filter.volume()
+            row += 1
+        if where != batch_run.DONE and row < len(Y):
+            rule.advance(row - 1, partial(filter.predict, U[row - 1] if U.shape[1] else None))
+            if rule.has_started_again():
+                run.status[row] = "reset"
 
 
 def _table(name: str, value: ArrayLike, columns: int) -> Matrix:
-    table = np.array(value, dtype=np.float64)
+    table = numbers(name, value)
     if table.ndim == 1 and columns <= 1:
         table = table.reshape(-1, columns) if columns else np.zeros((table.size, 0))
     if table.ndim != 2 or table.shape[1] != columns:
@@ -123,20 +164,3 @@ def _inputs(U: ArrayLike | None, rows: int, columns: int, needs_last: bool) -> M
     if not np.isfinite(table[: rows if needs_last else rows - 1]).all():
         raise ModelError("U must hold finite numbers only")
     return table
-
-
-def _update(filter: Filter, Y: Matrix, U: Matrix, row: int) -> None:
-    try:
-        if filter.model.has_plain_outputs:
-            filter.update(Y[row])
-        else:
-            filter.update(Y[row], u=U[row])
-    except LsuMeshError as error:
-        raise named_row(row, error) from error
-
-
-def _predict(filter: Filter, U: Matrix, row: int) -> None:
-    try:
-        filter.predict(U[row] if U.shape[1] else None)
-    except LsuMeshError as error:
-        raise named_row(row, error) from error

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.array_types import Array, Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.kernels.discretisation.step_charges import charge
 from lsu_mesh.model import LSUModel
@@ -93,9 +93,38 @@ def with_offset(model: LSUModel, U: Matrix) -> Matrix:
     return U if model.a is None else np.concatenate([U, np.ones((*U.shape[:-1], 1))], axis=-1)
 
 
+def numbers(name: str, value: ArrayLike) -> Array:
+    """An array of floats, NaN where an entry is masked; ``ModelError`` with the name where it holds no real numbers."""
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value.copy()
+    try:
+        given = value if isinstance(value, np.ndarray) else np.asarray(value)
+        has_mask = isinstance(given, np.ma.MaskedArray) or (not isinstance(value, np.ndarray) and _has_mask(value))
+        if has_mask:
+            given = np.ma.asarray(np.ma.array(value))
+        is_number = given.dtype.kind in "biuf" or (given.dtype.kind == "O" and not _has_text(given)) or not given.size
+        found = np.ma.filled(given.astype(np.float64), np.nan) if is_number else None
+    except (TypeError, ValueError) as error:
+        raise ModelError(f"{name} must hold real numbers in rows of equal length: {error}") from error
+    if found is None:
+        raise ModelError(f"{name} must hold real numbers, it holds {given.dtype}")
+    return np.array(found, dtype=np.float64)
+
+
+def _has_mask(value: object) -> bool:
+    """Whether rows or entries of a sequence are masked: numpy would take their data."""
+    if isinstance(value, np.ma.MaskedArray):
+        return True
+    return isinstance(value, (list, tuple)) and any(map(_has_mask, value))
+
+
+def _has_text(given: Array) -> bool:
+    return any(isinstance(entry, (str, bytes)) for entry in given.flat)
+
+
 def output_vector(y: ArrayLike, size: int) -> Vector:
     """y (m,) with NaN for missing entries; ``ModelError`` on a wrong length or an infinite entry."""
-    values = np.array(y, dtype=np.float64)
+    values = numbers("y", y)
     if values.ndim == 0 and size == 1:
         values = values.reshape(1)
     if values.shape != (size,):
@@ -109,7 +138,7 @@ def half_width_vector(name: str, given: ArrayLike | None, default: Vector) -> Ve
     """Half-widths of this step, ``default`` where none are given; a scalar stands for all entries."""
     if given is None:
         return default
-    values = np.array(given, dtype=np.float64)
+    values = numbers(name, given)
     if values.ndim == 0:
         values = np.full(default.size, float(values))
     if values.shape != default.shape:
@@ -137,7 +166,7 @@ def input_vector(u: ArrayLike | None, size: int) -> Vector:
         if size:
             raise ModelError(f"the model has {size} input(s): give u, or an Orthotope that holds the unknown input")
         return np.zeros(0)
-    values = np.array(u, dtype=np.float64)
+    values = numbers("u", u)
     if values.ndim == 0 and size == 1:
         values = values.reshape(1)
     if values.shape != (size,):

@@ -14,6 +14,8 @@ from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
+from lsu_mesh.kernels.parallelotopes.box import keep_constants
+from lsu_mesh.kernels.parallelotopes.bundle import tighten_all
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
 from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
@@ -23,6 +25,9 @@ from lsu_mesh.supports.linear_programs import is_proved_empty
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
+
+COLUMNS, COLUMNS_PER_STATE = 15, 3
+"""Columns of a zonotope at least, and for each state, where the user states no order."""
 
 
 class Strips(NamedTuple):
@@ -51,12 +56,21 @@ class ZonotopicKalman(Filter):
     model, prior:
         LSU model with n states; a set, or a pair (lower, upper), that holds x_1.
     order:
-        Columns of H that are kept in all at each time update, at least n: the longest, and a box of the others;
-        ``None``: all.
+        Columns of H that are kept in all at each time update, at least n: the longest, and a box of the others.
+        ``None`` stands for ``max(15, 3 n)``.
     form:
         ``"filter"``: the support after :meth:`update` has used y_k. ``"predictor"``: it is that of the one-step
         prediction from y_{k−1}; y_k is used by the next :meth:`predict` (Combastel's original form, and what P2018
         compares).
+    box:
+        Whether a box is carried beside the zonotope, by interval arithmetic over the data and the time updates, and
+        :meth:`bounds` are met with it: they never forget what was once known of a constant. The zonotope takes nothing
+        from it, but a proof that the data contradict the bounds.
+    scaled:
+        Whether columns are compared in units of the set's half-widths, which no unit of a state can change; ``False``:
+        in the states' own units, as in the papers.
+    reduce:
+        ``False``: all columns are kept, the set grows with every step.
 
     Raises
     ------
@@ -64,19 +78,24 @@ class ZonotopicKalman(Filter):
         Names the option or the prior that is wrong.
 
     ``K = P C'(C P C' + R)⁻¹``, ``P = H H'``, ``R = diag(r²)``, minimises the sum of squares of the generators
-    (Combastel 2015). The set is guaranteed for any K.
+    (Combastel 2015); rows are taken one after the other, and one that tells nothing new is left out. The set is
+    guaranteed for any K.
     """
 
     kind: ClassVar[str] = "ZonotopicKalman"
     guarantee: ClassVar[Guarantee] = "declared"
+    algorithm: ClassVar[int] = 2
     _held: Held
 
     def __init__(
         self,
         model: LSUModel,
         prior: Support | tuple[ArrayLike, ArrayLike],
-        order: int | None = 15,
+        order: int | None = None,
         form: Literal["filter", "predictor"] = "filter",
+        box: bool = True,
+        scaled: bool = True,
+        reduce: bool = True,
     ) -> None:
         if form not in ("filter", "predictor"):
             raise ModelError(f'form must be "filter" or "predictor", it is {form!r}')
@@ -84,8 +103,11 @@ class ZonotopicKalman(Filter):
             raise ModelError(f"order must be at least {model.state_count}, the number of states, it is {order}")
         self._model = model
         self._arrays = kernel_model(model)
-        self._order = order
+        chosen = max(COLUMNS, COLUMNS_PER_STATE * model.state_count) if order is None else order
+        self._order = chosen if reduce else None
         self._form = form
+        self._has_box = bool(box)
+        self._scaled = bool(scaled)
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
     @property
@@ -104,9 +126,8 @@ class ZonotopicKalman(Filter):
         return np.clip(self._held.c, *self.bounds())
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Interval hull of the zonotope, met with what the domain or a transferred box says; (n,), (n,)."""
-        lower, upper = self.support.bounds()
-        return np.maximum(lower, self._held.lower), np.minimum(upper, self._held.upper)
+        """Interval hull of the zonotope, met with the box beside it; (n,), (n,)."""
+        return _bounds(self._held)
 
     def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
         """``C c ± (Σ_j |C H_j| + r)``, met with the image of :meth:`bounds`."""
@@ -135,13 +156,16 @@ class ZonotopicKalman(Filter):
         known = ~np.isnan(values)
         if known.any():
             strips = Strips(np.array(C[known]), values[known], widths[known])
-            if self._excludes(strips):
-                raise strip_contradiction(used.outputs, *self._image(C), values, widths)
-            if self._form == "filter":
-                self._held = _corrected(self._held, strips)
-            else:
-                waiting = self._held.pending
-                self._held = self._held._replace(pending=Strips(*map(_stacked, waiting, strips)))
+            waiting = self._held.pending
+            try:
+                if self._excludes(strips):
+                    raise InconsistentData("the strips are proved to miss the zonotope")
+                if self._form == "filter":
+                    self._held = self._with_data(self._held, strips)
+                else:
+                    self._held = self._held._replace(pending=Strips(*map(_stacked, waiting, strips)))
+            except InconsistentData as contradiction:
+                raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
         return self.support
 
     def predict(
@@ -154,18 +178,20 @@ class ZonotopicKalman(Filter):
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
         center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
-        held = _corrected(self._held, self._held.pending)
+        held = self._with_data(self._held, self._held.pending)
         body = (held.c, held.H, np.zeros((0, held.H.shape[1])), np.zeros(0))
         finite, moved, lower, upper = predict_constrained(
-            body, *self.bounds(), arrays.A, arrays.B, center, arrays.G, widths
+            body, *_bounds(held), arrays.A, arrays.B, center, arrays.G, widths
         )
         if not finite:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
-        c, H = moved[0], moved[1] if self._order is None else box_shortest(moved[1], self._order)
-        if used.domain is None:
-            lower, upper = _everything(c.size)
-        else:
+        c, H = moved[0], moved[1] if self._order is None else box_shortest(moved[1], self._order, self._scaled)
+        least, most = map(np.array, _bounds(held))
+        keep_constants(least, most, arrays.A, arrays.B, center, arrays.G, widths, lower, upper)
+        if used.domain is not None:
             lower, upper = np.maximum(lower, used.domain.lower), np.minimum(upper, used.domain.upper)
+        elif not self._has_box:
+            lower, upper = _everything(c.size)
         held = Held(c=c, H=H, lower=lower, upper=upper, pending=_no_strips(c.size))
         if _is_contradictory(held):
             raise InconsistentData("the prediction is proved to miss the domain")
@@ -190,7 +216,7 @@ class ZonotopicKalman(Filter):
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
         shrunk = _corrected(met._replace(pending=_no_strips(box.dim)), strips)._replace(pending=met.pending)
         if self._order is not None:
-            shrunk = shrunk._replace(H=box_shortest(shrunk.H, self._order))
+            shrunk = shrunk._replace(H=box_shortest(shrunk.H, self._order, self._scaled))
         self._held = shrunk if _size(shrunk) < _size(met) else met
         return hull_gain(before, self.bounds())
 
@@ -201,7 +227,7 @@ class ZonotopicKalman(Filter):
         if body.constraint_count:
             body = given.interval_hull().to_constrained_zonotope()
         c, H, _, _ = body.arrays
-        H = H if self._order is None else box_shortest(H, self._order)
+        H = H if self._order is None else box_shortest(H, self._order, self._scaled)
         self._held = Held(c, H, *given.bounds(), _no_strips(c.size))
 
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
@@ -231,6 +257,20 @@ class ZonotopicKalman(Filter):
             raise ModelError(f"the snapshot must be one of ZonotopicKalman, it is {type(snapshot).__name__}")
         self._held = snapshot
 
+    def _with_data(self, held: Held, strips: Strips) -> Held:
+        """The data update of the zonotope, and of the box; no data wait any more."""
+        if strips.y.size == 0:
+            return held
+        if self._has_box:
+            lower, upper = map(np.array, _bounds(held))
+            if tighten_all(lower, upper, strips.C, strips.y, strips.r):
+                raise InconsistentData("the strips are proved to miss the box beside the zonotope")
+            held = held._replace(lower=lower, upper=upper)
+        new = _corrected(held, strips)
+        if _is_contradictory(new):
+            raise InconsistentData("the data are proved to contradict the set")
+        return new
+
     def _image(self, C: Matrix) -> tuple[Vector, Vector]:
         """Bounds of ``C x``."""
         box_low, box_high = image_of_box(C, *self.bounds())
@@ -256,9 +296,15 @@ def _corrected(held: Held, strips: Strips) -> Held:
     return held._replace(c=c, H=H, pending=_no_strips(c.size))
 
 
-def _is_contradictory(held: Held) -> bool:
+def _bounds(held: Held) -> tuple[Vector, Vector]:
+    """The hull of the zonotope, met with the box."""
     lower, upper = Zonotope(held.c, held.H).bounds()
-    return bool((np.maximum(lower, held.lower) > np.minimum(upper, held.upper)).any())
+    return np.maximum(lower, held.lower), np.minimum(upper, held.upper)
+
+
+def _is_contradictory(held: Held) -> bool:
+    lower, upper = _bounds(held)
+    return bool((lower > upper).any())
 
 
 def _size(held: Held) -> float:

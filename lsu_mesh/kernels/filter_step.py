@@ -1,9 +1,10 @@
 """One step of each family of filters: the single place where single step, loop and bank come together.
 
-A state is a matrix with rows of length n: ``BOX`` lower, upper; ``PARALLELOTOPE`` c, then the n rows of T; ``BUNDLE``
-c, the n rows of T, lower, upper. ``option`` is, for ``BOX``, whether the hull is met with the prediction, and for
-``PARALLELOTOPE`` the kind of time update (``kernels/parallelotopes/parallelotope.py``). All families and actions share
-one compiled function: each further one would compile everything below it once more.
+A state is a matrix with rows of length n: ``BOX`` lower, upper; ``PARALLELOTOPE`` c, then the n rows of T, and where a
+box is carried beside it, which it takes nothing from, lower, upper; ``BUNDLE`` c, the n rows of T, lower, upper.
+``option`` is, for ``BOX``, whether the hull is met with the prediction, and for ``PARALLELOTOPE`` the kind of time
+update (``kernels/parallelotopes/parallelotope.py``). All families and actions share one compiled function: each further
+one would compile everything below it once more.
 """
 
 from __future__ import annotations
@@ -57,10 +58,11 @@ def advance(
         return 0
     n = S.shape[1]
     box_row = 0 if family == BOX else n + 1
+    boxed = family == PARALLELOTOPE and S.shape[0] > n + 1
     status = 0
-    if family != PARALLELOTOPE:
+    if family != PARALLELOTOPE or boxed:
         status = _advance_box(
-            action, option, family == BUNDLE, S[box_row : box_row + 2], P, first, second,
+            action, option, family != BOX, S[box_row : box_row + 2], P, first, second,
             A, B, u, G, widths, new[box_row : box_row + 2], work,
         )  # fmt: skip
     if status != 0 or family == BOX:
@@ -72,18 +74,34 @@ def advance(
     if action == PREDICT:
         time_update = option if family == PARALLELOTOPE else STRIPS
         status = _predict_parallelotope(S[0], S[1 : n + 1], A, B, u, G, widths, time_update, c, T, work)
-        if status != 0 or time_update != STRIPS:
-            return status
         low, high = row(work, n, BUNDLE_ROW), row(work, n, BUNDLE_ROW + 1)
-        if family == BUNDLE:  # the hull of the image is exact: tighter than the hull of what encloses it
+        if status == 0 and (boxed or family == BUNDLE):  # the hull of the image is exact: tighter than that of the set
+            if boxed:
+                box.keep_constants(S[n + 1], S[n + 2], A, B, u, G, widths, new[n + 1], new[n + 2])
             status = shrink(new[n + 1], new[n + 2], low, high)
+        if status != 0 or (time_update != STRIPS and not boxed):
+            return status
     else:
+        time_update = STRIPS
         copy(S[0 : n + 1], new[0 : n + 1])
-    if status == 0 and (family == PARALLELOTOPE or action == UPDATE):
+    if status == 0 and time_update == STRIPS and (family == PARALLELOTOPE or action == UPDATE):
         status = cut_all(c, T, rows, low, high, interval, work)
-    if status != 0 or family == PARALLELOTOPE:
+    if status != 0 or (family == PARALLELOTOPE and not boxed):
         return status
+    if boxed:
+        return _meet_hull(c, T, new[n + 1], new[n + 2], work)
     return tighten_each_other(c, T, new[n + 1], new[n + 2], work)
+
+
+@inlined
+def _meet_hull(c: Vector, T: Matrix, lower: Vector, upper: Vector, work: Scratch) -> int:
+    """The box beside a parallelotope, met with its hull; 0, or k + 1 where coordinate k leaves nothing."""
+    n = c.size
+    low, high, no_error = row(work, n, BUNDLE_ROW), row(work, n, BUNDLE_ROW + 1), row(work, n, BUNDLE_ROW + 2)
+    for i in range(n):
+        no_error[i] = 0.0
+    hull(c, T, no_error, low, high)
+    return shrink(lower, upper, low, high)
 
 
 @inlined
@@ -128,7 +146,8 @@ def predict_output(
         _output_of_box(S[0], S[1], C, r, lower, upper, point)
         return
     _output_of_parallelotope(S[0], S[1 : n + 1], C, r, lower, upper, point)
-    if family == BUNDLE:
+    boxed = family == PARALLELOTOPE and S.shape[0] > n + 1
+    if family == BUNDLE or boxed:
         for k in range(C.shape[0]):
             low, high, mid = (
                 row(work, 1, n * BUNDLE_ROW),
@@ -137,7 +156,7 @@ def predict_output(
             )
             _output_of_box(S[n + 1], S[n + 2], C[k : k + 1], r[k : k + 1], low, high, mid)
             lower[k], upper[k] = max(lower[k], low[0]), min(upper[k], high[0])
-            point[k] = middle(lower[k], upper[k])
+            point[k] = min(max(point[k], lower[k]), upper[k]) if boxed else middle(lower[k], upper[k])
 
 
 @kernel
@@ -149,8 +168,11 @@ def describe(family: int, S: Matrix, point: Vector, lower: Vector, upper: Vector
         for i in range(n):
             no_error[i] = 0.0
         hull(S[0], S[1 : n + 1], no_error, lower, upper)
+        boxed = S.shape[0] > n + 1
         for i in range(n):
-            point[i] = S[0, i]
+            if boxed:
+                lower[i], upper[i] = S[n + 1, i], S[n + 2, i]
+            point[i] = min(max(S[0, i], lower[i]), upper[i])
         return volume_of(S[1 : n + 1], square(work, n, FACTOR))
     first = 0 if family == BOX else n + 1
     for i in range(n):

@@ -38,7 +38,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("systems") / "made.json"
     path.write_text(json.dumps(data))
     made = read_benchmark(path)
-    engine = LSUCZ(made.model, made.prior, None, None)
+    engine = LSUCZ(made.model, made.prior, reduce=False)
     hulls = {}
     for k in range(4):
         engine.update(made.Y[k])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 
+import numpy as np
 import pytest
 
 from lsu_mesh.experiments.outcome import Check, Column, Table, percent
@@ -37,3 +39,13 @@ def test_a_check_says_whether_it_is_met() -> None:
     assert str(Check("width", 0.5, 0.4)) == "NOT MET: width = 0.5 (at most 0.4)"
     assert str(Check("inside", 1.0, 1.0, "at least")) == "met: inside = 1 (at least 1)"
     assert not Check("inside", math.nan, 1.0, "at least").is_met
+
+
+def test_records_hold_no_number_of_numpy_and_none_that_json_does_not_know() -> None:
+    row = ("a", np.float64(1.5), np.int64(3), np.bool_(True), math.nan)
+    table = Table("t", "A title", tuple(map(Column, "abcde")), [row])
+    (record,) = table.records()
+    assert json.loads(json.dumps(record, allow_nan=False)) == {"a": "a", "b": 1.5, "c": 3, "d": True, "e": None}
+    checks = [Check("width", np.float64(0.5), np.float64(0.4)), Check("width", math.nan, 1.0)]
+    found = [json.loads(json.dumps(check.record(), allow_nan=False)) for check in checks]
+    assert [(one["measured"], one["met"]) for one in found] == [(0.5, False), (None, False)]

@@ -37,8 +37,8 @@ OPTIONS: dict[str, tuple[dict[str, Any], ...]] = {
 }
 """Options beside the defaults."""
 UNREDUCED: dict[str, dict[str, Any]] = {
-    "LSUCZ": {"max_generators": None, "max_constraints": None},
-    "ZonotopicKalman": {"order": None},
+    "LSUCZ": {"reduce": False},
+    "ZonotopicKalman": {"reduce": False},
 }
 """Sets without limits grow with every step."""
 CHOICES = [(kind, options) for kind in sorted(FILTERS) for options in ({}, *OPTIONS.get(kind, ()))]

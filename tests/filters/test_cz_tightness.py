@@ -20,7 +20,8 @@ def _measured(model: LSUModel, seed: int, steps: int, spread: float = 1.0) -> tu
 
 
 def _widths(model: LSUModel, outputs: np.ndarray, inputs: np.ndarray, *limits: int | None) -> np.ndarray:
-    estimator = LSUCZ(model, Orthotope(-np.ones(model.state_count), np.ones(model.state_count)), *limits)
+    prior = Orthotope(-np.ones(model.state_count), np.ones(model.state_count))
+    estimator = LSUCZ(model, prior, *limits, reduce=bool(limits))
     widths = []
     for y, u in zip(outputs, inputs, strict=True):
         estimator.update(y)
@@ -35,7 +36,7 @@ def test_hull_width_on_p3() -> None:
     ratios: dict[tuple[int, int], list[float]] = {(12, 4): [], (20, 8): []}
     for seed in range(5):
         _, outputs, inputs = _measured(model, seed, 30)
-        exact = _widths(model, outputs, inputs, None, None)[5:]
+        exact = _widths(model, outputs, inputs)[5:]
         for limits, found in ratios.items():
             ratio = _widths(model, outputs, inputs, *limits)[5:] / exact
             assert (ratio >= 1 - 1e-9).all()

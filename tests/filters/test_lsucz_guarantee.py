@@ -20,11 +20,11 @@ MAKERS: dict[str, Maker] = {
     "LSUCZ(12, 4)": lambda model, prior: LSUCZ(model, prior, 12, 4, point="nearest"),
     "LSUCZ(n + 2, 2)": lambda model, prior: LSUCZ(model, prior, model.state_count + 2, 2),
     "LSUCZ(n, 0)": lambda model, prior: LSUCZ(model, prior, model.state_count, 0),
-    "LSUCZ unreduced": lambda model, prior: LSUCZ(model, prior, None, None),
+    "LSUCZ unreduced": lambda model, prior: LSUCZ(model, prior, reduce=False),
     "ZonotopicKalman": ZonotopicKalman,
     "ZonotopicKalman, order n": lambda model, prior: ZonotopicKalman(model, prior, model.state_count),
     "ZonotopicKalman, predictor": lambda model, prior: ZonotopicKalman(model, prior, 9, "predictor"),
-    "ZonotopicKalman unreduced": lambda model, prior: ZonotopicKalman(model, prior, None),
+    "ZonotopicKalman unreduced": lambda model, prior: ZonotopicKalman(model, prior, reduce=False),
 }
 every_filter = pytest.mark.parametrize("name", MAKERS)
 MAX_EXACT = 24

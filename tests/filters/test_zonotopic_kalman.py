@@ -22,7 +22,7 @@ PRIOR = Orthotope([-1.0] * 3, [1.0] * 3)
 @pytest.mark.parametrize("form", ["filter", "predictor"])
 @pytest.mark.parametrize("order", [3, 15, None])
 def test_the_truth_is_held(form: str, order: int | None) -> None:
-    estimator = ZonotopicKalman(MODEL, PRIOR, order, form)
+    estimator = ZonotopicKalman(MODEL, PRIOR, order, form, reduce=order is not None)
     rng = np.random.default_rng(2)
     x = rng.uniform(-1, 1, 3)
     for _ in range(40):
@@ -74,7 +74,7 @@ def test_any_gain_keeps_the_exact_state(seed: int) -> None:
     K = kalman_gain(H, C, r) if seed % 2 else rng.normal(size=(n, m))
     centre, generators, slack = corrected(c, H, C, y, r, K)
     generators, _ = absorb_box(generators, np.zeros((0, generators.shape[1])), slack)
-    for columns in (generators, box_shortest(generators, n + 1)):
+    for columns in (generators, box_shortest(generators, n + 1, True), box_shortest(generators, n + 1, False)):
         rows = [[Fraction(v) for v in row] for row in columns.tolist()]
         sides = [v - s for v, s in zip(x, _fractions(centre), strict=True)]
         assert exact_solution(rows, sides, [0.5] * columns.shape[1]) is not None

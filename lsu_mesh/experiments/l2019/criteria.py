@@ -35,9 +35,9 @@ TRANSIENT = 50
 """Steps that do not count for volumes and lengths, which else show the prior."""
 KINDS: Mapping[str, tuple[type[CompiledFilter], Mapping[str, object]]] = {
     "LSUO": (LSUO, {"meet": False}),
-    "LSUP": (LSUP, {"time_update": "image"}),
+    "LSUP": (LSUP, {"time_update": "image", "box": False}),
     "LSUO, met with the prediction": (LSUO, {}),
-    "LSUP, strips": (LSUP, {"time_update": "strips"}),
+    "LSUP, strips": (LSUP, {"time_update": "strips", "box": False}),
     "LSUPB": (LSUPB, {}),
 }
 """The report's two, then ours."""

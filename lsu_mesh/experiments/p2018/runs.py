@@ -50,13 +50,17 @@ ESTIMATORS: Mapping[str, Estimator] = {
         is_guaranteed=False,
     ),
     "ZKF q=15, predictor": Estimator(
-        lambda model, prior: ZonotopicKalman(model, prior, order=15, form="predictor"), "ZKF q=15"
+        lambda model, prior: ZonotopicKalman(model, prior, order=15, form="predictor", box=False, scaled=False),
+        "ZKF q=15",
     ),
     "ZKF q=3, predictor": Estimator(
-        lambda model, prior: ZonotopicKalman(model, prior, order=3, form="predictor"), "ZKF q=3"
+        lambda model, prior: ZonotopicKalman(model, prior, order=3, form="predictor", box=False, scaled=False),
+        "ZKF q=3",
     ),
-    "ZKF q=15, filter": Estimator(lambda model, prior: ZonotopicKalman(model, prior, order=15)),
-    "ZKF q=3, filter": Estimator(lambda model, prior: ZonotopicKalman(model, prior, order=3)),
+    "ZKF q=15, filter": Estimator(
+        lambda model, prior: ZonotopicKalman(model, prior, order=15, box=False, scaled=False)
+    ),
+    "ZKF q=3, filter": Estimator(lambda model, prior: ZonotopicKalman(model, prior, order=3, box=False, scaled=False)),
     "WindowMAP, centre": Estimator(
         lambda model, prior: WindowMAP(model, prior, window=25, kappa=KAPPA), is_guaranteed=False
     ),

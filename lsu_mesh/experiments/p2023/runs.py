@@ -28,9 +28,9 @@ GENERATORS, CONSTRAINTS = 20, 8
 """Limits of complexity of LSUCZ: the paper gives none."""
 BOXES: Mapping[str, Callable[[LSUModel, Orthotope], CompiledFilter]] = {
     "LSUO": lambda model, prior: LSUO(model, prior, meet=False),
-    "LSUP": lambda model, prior: LSUP(model, prior, time_update="image"),
+    "LSUP": lambda model, prior: LSUP(model, prior, time_update="image", box=False),
     "LSUO, met with the prediction": lambda model, prior: LSUO(model, prior),
-    "LSUP, strips": lambda model, prior: LSUP(model, prior, time_update="strips"),
+    "LSUP, strips": lambda model, prior: LSUP(model, prior, time_update="strips", box=False),
     "LSUPB": lambda model, prior: LSUPB(model, prior),
 }
 CZ_HULL, CZ_NEAREST = "LSUCZ-1", "LSUCZ-2"

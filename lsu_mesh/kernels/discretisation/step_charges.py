@@ -9,7 +9,7 @@ import numpy as np
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.discretisation.interval_matrices import outward
 from lsu_mesh.kernels.runtime.compile import inner, kernel
-from lsu_mesh.kernels.runtime.rounding import down, gamma, up
+from lsu_mesh.kernels.runtime.rounding import down, gamma, size_of_product, up
 
 MAX_PASSES = 100
 GROWTH = 1.0 + 2.0**-20
@@ -28,9 +28,9 @@ def charge(
     for i in range(n):
         total = a_radius[i]
         for j in range(n):
-            total += A_radius[i, j] * max(abs(lower[j]), abs(upper[j]))
+            total += size_of_product(A_radius[i, j], max(abs(lower[j]), abs(upper[j])))
         for j in range(p):
-            total += B_radius[i, j] * (abs(u[j]) + u_widths[j])
+            total += size_of_product(B_radius[i, j], abs(u[j]) + u_widths[j])
         if total > 0.0:
             widths[first + i] = outward(widths[first + i] + total, n + p + 2)
 

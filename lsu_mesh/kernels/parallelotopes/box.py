@@ -16,8 +16,8 @@ from lsu_mesh.kernels.parallelotopes.strip_update import (
     hull,
     middle,
 )
-from lsu_mesh.kernels.runtime.compile import inlined, inner
-from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, up
+from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
+from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, size_of_product, up
 from lsu_mesh.kernels.runtime.scratch import BODY, BOX, DELTA, STRIP, Scratch, row, square
 from lsu_mesh.kernels.runtime.unowned_views import block
 
@@ -41,16 +41,14 @@ def predict(
     for i in range(n):
         centre, magnitude, reach = 0.0, 0.0, 0.0
         for j in range(n):
-            term = A[i, j] * c[j]
-            centre += term
-            magnitude += abs(term)
-            reach += abs(A[i, j]) * q[j]
+            centre += A[i, j] * c[j]
+            magnitude += size_of_product(A[i, j], c[j])
+            reach += size_of_product(A[i, j], q[j])
         for j in range(p):
-            term = B[i, j] * u[j]
-            centre += term
-            magnitude += abs(term)
+            centre += B[i, j] * u[j]
+            magnitude += size_of_product(B[i, j], u[j])
         for j in range(k):
-            reach += abs(G[i, j]) * widths[j]
+            reach += size_of_product(G[i, j], widths[j])
         reach += gamma(n + p + 2) * magnitude
         reach += gamma(2 * n + p + k + 8) * reach
         if reach == 0.0:
@@ -60,6 +58,28 @@ def predict(
             new_lower[i], new_upper[i] = down(centre - reach), up(centre + reach)
         finite = finite and math.isfinite(new_lower[i]) and math.isfinite(new_upper[i])
     return 0 if finite else OVERFLOW
+
+
+@kernel
+def keep_constants(
+    lower: Vector, upper: Vector, A: Matrix, B: Matrix, u: Vector, G: Matrix, widths: Vector,
+    new_lower: Vector, new_upper: Vector,
+) -> None:  # fmt: skip
+    """The bounds of each coordinate that a time update leaves as it is, bit by bit: rounding never widens a constant.
+
+    As :func:`predict`; ``x_i⁺ = x_i`` where row i of A is that of the identity and nothing drives it.
+    """
+    n = lower.size
+    for i in range(n):
+        constant = A[i, i] == 1.0
+        for j in range(n):
+            constant = constant and (j == i or A[i, j] == 0.0)
+        for j in range(u.size):
+            constant = constant and (B[i, j] == 0.0 or u[j] == 0.0)
+        for j in range(widths.size):
+            constant = constant and (G[i, j] == 0.0 or widths[j] == 0.0)
+        if constant:
+            new_lower[i], new_upper[i] = max(lower[i], new_lower[i]), min(upper[i], new_upper[i])
 
 
 @inlined

@@ -13,7 +13,7 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes.box import tighten
 from lsu_mesh.kernels.parallelotopes.parallelotope import cut_all, faces
 from lsu_mesh.kernels.parallelotopes.strip_update import EMPTY, OVERFLOW, hull
-from lsu_mesh.kernels.runtime.compile import inlined, inner
+from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 from lsu_mesh.kernels.runtime.rounding import down, up
 from lsu_mesh.kernels.runtime.scratch import BODY, BUNDLE, FACTOR, IDENTITY, Scratch, row, square
 
@@ -44,7 +44,7 @@ def tighten_each_other(c: Vector, T: Matrix, lower: Vector, upper: Vector, work:
     return 0
 
 
-@inner
+@kernel
 def tighten_all(lower: Vector, upper: Vector, P: Matrix, y: Vector, r: Vector) -> int:
     """The box by the exact hull of its meet with each strip ``|y − P x| ≤ r`` in turn, in place; NaN is no strip.
 

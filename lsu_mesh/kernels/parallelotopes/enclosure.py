@@ -14,7 +14,7 @@ import math
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 from lsu_mesh.kernels.runtime.linear_algebra import invert, orthogonal_basis
-from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, UNIT_ROUNDOFF, gamma, up
+from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, UNIT_ROUNDOFF, gamma, size_of_product, up
 from lsu_mesh.kernels.runtime.scratch import BASIS, ENCLOSE, FACTOR, INVERSE, Scratch, columns_of, row, square
 
 MAX_RESIDUAL = 0.25
@@ -114,13 +114,12 @@ def _noise_reach(M: Matrix, i: int, G: Matrix, widths: Vector, delta: Vector) ->
         if widths[j] > 0.0:
             entry, size = 0.0, 0.0
             for k in range(n):
-                term = M[i, k] * G[k, j]
-                entry += term
-                size += abs(term)
-            reach += abs(entry) * widths[j]
-            magnitude += size * widths[j]
+                entry += M[i, k] * G[k, j]
+                size += size_of_product(M[i, k], G[k, j])
+            reach += size_of_product(entry, widths[j])
+            magnitude += size_of_product(size, widths[j])
     for k in range(n):
-        reach += abs(M[i, k]) * delta[k]
+        reach += size_of_product(M[i, k], delta[k])
     return inflate(reach + gamma(n + 2) * magnitude, 2 * n + q + 8)
 
 
@@ -132,9 +131,8 @@ def _edge_reach(M: Matrix, i: int, T: Matrix) -> float:
     for j in range(n):
         entry = 0.0
         for k in range(n):
-            term = M[i, k] * T[k, j]
-            entry += term
-            magnitude += abs(term)
+            entry += M[i, k] * T[k, j]
+            magnitude += size_of_product(M[i, k], T[k, j])
         reach += abs(entry)
     return inflate(reach + gamma(n + 2) * magnitude, n * n + n + 6)
 
@@ -159,12 +157,12 @@ def _grow(V: Matrix, M: Matrix, grown: Vector, own: Vector, work: Scratch, T: Ma
     for i in range(n):
         size = 0.0
         for j in range(n):
-            size += abs(V[i, j]) * (own[j] + first[j])
+            size += size_of_product(V[i, j], own[j] + first[j])
         lost[i] = inflate(8.0 * UNIT_ROUNDOFF * size, n + 4)
     for i in range(n):
         reach = grown[i]
         for k in range(n):
-            reach += abs(M[i, k]) * lost[k]
+            reach += size_of_product(M[i, k], lost[k])
         grown[i] = inflate(reach, n + 4)
     _solve_bound(grown, residual, largest, final)
     for i in range(n):

@@ -10,7 +10,7 @@ from lsu_mesh.kernels.parallelotopes.enclosure import MAX_RESIDUAL, enclose, inf
 from lsu_mesh.kernels.parallelotopes.strip_update import EMPTY, OVERFLOW, STRIP_ROWS, UNCHANGED, cut
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
 from lsu_mesh.kernels.runtime.linear_algebra import invert
-from lsu_mesh.kernels.runtime.rounding import down, gamma, up
+from lsu_mesh.kernels.runtime.rounding import down, gamma, size_of_product, up
 from lsu_mesh.kernels.runtime.scratch import BUNDLE, DELTA, STRIP, Scratch, candidates_of, row, weights_of
 from lsu_mesh.kernels.runtime.unowned_views import block
 
@@ -52,7 +52,7 @@ def zonotope_hull(c: Vector, T: Matrix, G: Matrix, widths: Vector, delta: Vector
         for j in range(n):
             reach += abs(T[i, j])
         for j in range(q):
-            reach += abs(G[i, j]) * widths[j]
+            reach += size_of_product(G[i, j], widths[j])
         reach = inflate(reach, n + q + 4)
         lower[i], upper[i] = down(c[i] - reach), up(c[i] + reach)
 
@@ -64,21 +64,18 @@ def image(c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, new_c: Vector, 
     for i in range(n):
         centre, magnitude = 0.0, 0.0
         for k in range(n):
-            term = A[i, k] * c[k]
-            centre += term
-            magnitude += abs(term)
+            centre += A[i, k] * c[k]
+            magnitude += size_of_product(A[i, k], c[k])
         for k in range(p):
-            term = B[i, k] * u[k]
-            centre += term
-            magnitude += abs(term)
+            centre += B[i, k] * u[k]
+            magnitude += size_of_product(B[i, k], u[k])
         for j in range(n):
             new_T[i, j] = 0.0
         for k in range(n):
             if A[i, k] != 0.0:
                 for j in range(n):
-                    term = A[i, k] * T[k, j]
-                    new_T[i, j] += term
-                    magnitude += abs(term)
+                    new_T[i, j] += A[i, k] * T[k, j]
+                    magnitude += size_of_product(A[i, k], T[k, j])
         new_c[i] = centre
         delta[i] = inflate(gamma(n + p + 2) * magnitude, n * n + n + p + 4)
 
@@ -137,13 +134,12 @@ def predict_output(c: Vector, T: Matrix, C: Matrix, r: Vector, lower: Vector, up
         s, magnitude, reach = 0.0, 0.0, 0.0
         for i in range(n):
             s += C[k, i] * c[i]
-            magnitude += abs(C[k, i] * c[i])
+            magnitude += size_of_product(C[k, i], c[i])
         for j in range(n):
             entry = 0.0
             for i in range(n):
-                term = C[k, i] * T[i, j]
-                entry += term
-                magnitude += abs(term)
+                entry += C[k, i] * T[i, j]
+                magnitude += size_of_product(C[k, i], T[i, j])
             reach += abs(entry)
         reach += r[k]
         reach = inflate(reach + gamma(n + 2) * magnitude, n * n + 2 * n + 8)

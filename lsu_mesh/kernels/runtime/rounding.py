@@ -27,6 +27,15 @@ def down(x: float) -> float:
 
 
 @inlined
+def size_of_product(a: float, b: float) -> float:
+    """``|a b|``, and ``UNDERFLOW`` where that is rounded to 0 and no factor is 0: only a true zero has no error."""
+    size = abs(a * b)
+    if size == 0.0 and a != 0.0 and b != 0.0:
+        return UNDERFLOW
+    return size
+
+
+@inlined
 def gamma(k: int) -> float:
     """``γ_k`` rounded up (with one operation to spare for the multiplication by it)."""
     return (k + 2) * UNIT_ROUNDOFF / (1.0 - (k + 2) * UNIT_ROUNDOFF)

@@ -6,7 +6,7 @@ import numpy as np
 
 from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner, kernel
-from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, up
+from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, down, gamma, size_of_product, up
 from lsu_mesh.kernels.zonotopes.zonotope import absorb_box, padded
 
 Body = tuple[Array, Array, Array, Array]
@@ -39,27 +39,28 @@ def predict_constrained(
         inputs = 0.0
         for k in range(u.size):
             shift += B[i, k] * u[k]
-            inputs += abs(B[i, k] * u[k])
+            inputs += size_of_product(B[i, k], u[k])
         spread = 0.0
         scaled = 0.0
         j = g
         for k in range(widths.size):
             if widths[k] > 0.0:
                 generators[i, j] = N[i, k] * widths[k]
-                spread += abs(generators[i, j])
+                size = size_of_product(N[i, k], widths[k])
+                spread += size
                 if abs(N[i, k]) != 1.0:
-                    scaled += abs(generators[i, j])
+                    scaled += size
                 j += 1
         total = shift
         mass = inputs + scaled
         for s in range(n):
             total += R[i, s] * c[s]
-            mass += abs(R[i, s] * c[s])
+            mass += size_of_product(R[i, s], c[s])
         for j in range(g):
             entry = 0.0
             for s in range(n):
                 entry += R[i, s] * G[s, j]
-                mass += abs(R[i, s] * G[s, j])
+                mass += size_of_product(R[i, s], G[s, j])
             generators[i, j] = entry
         centre[i] = total
         slack[i] = 0.0 if mass == 0.0 else up(gamma(n + u.size + 4) * mass + UNDERFLOW)

@@ -11,7 +11,7 @@ import numpy as np
 
 from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inlined, inner, kernel
-from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
+from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, size_of_product, up
 
 
 @kernel
@@ -37,7 +37,7 @@ def zonotope_map(R: Array, c: Array, G: Array, shift: Array) -> tuple[Array, Arr
         mass = abs(shift[i])
         for s in range(n):
             total += R[i, s] * c[s]
-            mass += abs(R[i, s] * c[s])
+            mass += size_of_product(R[i, s], c[s])
         centre[i] = total
         selected = plain and terms <= 1
         lost = 0.0 if selected and (terms == 0 or shift[i] == 0.0) else mass
@@ -46,7 +46,7 @@ def zonotope_map(R: Array, c: Array, G: Array, shift: Array) -> tuple[Array, Arr
             entry = 0.0
             for s in range(n):
                 entry += R[i, s] * G[s, j]
-                row_mass += abs(R[i, s] * G[s, j])
+                row_mass += size_of_product(R[i, s], G[s, j])
             generators[i, j] = entry
         if not selected:
             lost += row_mass

@@ -5,46 +5,71 @@ from __future__ import annotations
 import numpy as np
 
 from lsu_mesh.array_types import Array
-from lsu_mesh.kernels.runtime.compile import kernel
-from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
-from lsu_mesh.kernels.zonotopes.generator_reduction import approximate_inverse
+from lsu_mesh.kernels.runtime.compile import inner, kernel
+from lsu_mesh.kernels.runtime.rounding import EPSILON, UNDERFLOW, gamma, up
+from lsu_mesh.kernels.zonotopes.zonotope import padded
 
 
 @kernel
 def kalman_gain(H: Array, C: Array, r: Array) -> Array:
-    """``K = P C' (C P C' + R)⁻¹`` (n, m) with ``P = H H'``, ``R = diag(r²)``; zeros where the inverse does not exist.
+    """``K = P C' (C P C' + R)⁻¹`` (n, m) with ``P = H H'``, ``R = diag(r²)``, one row of C after the other.
 
-    It minimises the sum of squares of all generators after the update. Any K gives a true set, so K is not bounded.
+    It minimises the sum of squares of all generators after the update, in any units of the states. Any K gives a true
+    set, so K is not bounded. A row whose output the set and the rows before it tell already, up to rounding, as a
+    second equal sensor with r = 0 does, has a column of zeros.
     """
     n, g = H.shape
     m = C.shape[0]
-    W = np.zeros((m, g))
-    for i in range(m):
-        for s in range(n):
-            if C[i, s] != 0.0:
-                for j in range(g):
-                    W[i, j] += C[i, s] * H[s, j]
-    S = np.empty((m, m))
-    for i in range(m):
-        for k in range(m):
-            total = r[i] * r[i] if i == k else 0.0
-            for j in range(g):
-                total += W[i, j] * W[k, j]
-            S[i, k] = total
-    inverse = approximate_inverse(S)
+    F = padded(H, n, g + m)
     K = np.zeros((n, m))
-    for s in range(n):
-        for i in range(m):
+    seen = np.empty(g + m)
+    gain = np.empty(n)
+    floor = ((n + m + 4) * EPSILON) ** 2
+    for i in range(m):
+        size = r[i]
+        for s in range(n):
+            for j in range(g):
+                size += abs(C[i, s] * H[s, j])
+        if size == 0.0:
+            continue
+        spread = (r[i] / size) ** 2
+        for j in range(g + i):
+            seen[j] = 0.0
+            for s in range(n):
+                seen[j] += C[i, s] * F[s, j]
+            seen[j] /= size
+            spread += seen[j] * seen[j]
+        if not spread > floor:
+            continue
+        finite = True
+        for s in range(n):
             total = 0.0
-            for k in range(m):
-                cross = 0.0
-                for j in range(g):
-                    cross += H[s, j] * W[k, j]
-                total += cross * inverse[k, i]
-            if not np.isfinite(total):
-                return np.zeros((n, m))
-            K[s, i] = total
+            for j in range(g + i):
+                total += F[s, j] * seen[j]
+            gain[s] = total / spread / size
+            finite = finite and np.isfinite(gain[s])
+        if finite:
+            _take_row(F, K, C[i], gain, seen, size, r[i], g, i)
     return K
+
+
+@inner
+def _take_row(
+    F: Array, K: Array, row: Array, gain: Array, seen: Array, size: float, r: float, g: int, i: int
+) -> None:  # fmt: skip
+    """``F ← [(I − k row) F, k r]``, ``K ← K + k (e_i − row K)`` with k the gain of row i."""
+    n = F.shape[0]
+    for k in range(i):
+        passed = 0.0
+        for s in range(n):
+            passed += row[s] * K[s, k]
+        for s in range(n):
+            K[s, k] -= gain[s] * passed
+    for s in range(n):
+        K[s, i] = gain[s]
+        for j in range(g + i):
+            F[s, j] -= gain[s] * (seen[j] * size)
+        F[s, g + i] = gain[s] * r
 
 
 @kernel
@@ -88,15 +113,26 @@ def corrected(c: Array, H: Array, C: Array, y: Array, r: Array, K: Array) -> tup
 
 
 @kernel
-def box_shortest(H: Array, order: int) -> Array:
-    """At most ``order ≥ n`` columns: the longest ones, and n axes that hold the box of all others (Combastel 2015)."""
+def box_shortest(H: Array, order: int, scaled: bool) -> Array:
+    """At most ``order ≥ n`` columns: the longest ones, and n axes that hold the box of all others (Combastel 2015).
+
+    ``scaled``: lengths are measured in units of the set's half-widths, so that they do not depend on the units of the
+    states.
+    """
     n, g = H.shape
     if g <= order:
         return H
+    width = np.zeros(n)
+    for i in range(n):
+        for j in range(g):
+            width[i] += abs(H[i, j])
+        if not scaled and width[i] > 0.0:
+            width[i] = 1.0
     length = np.zeros(g)
     for j in range(g):
         for i in range(n):
-            length[j] += H[i, j] * H[i, j]
+            if width[i] > 0.0:
+                length[j] += (H[i, j] / width[i]) ** 2
     whole = order - n
     columns = np.zeros((n, order))
     boxed = np.ones(g, dtype=np.bool_)

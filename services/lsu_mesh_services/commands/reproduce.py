@@ -164,9 +164,13 @@ def _print_json(outcome: Outcome) -> None:
     """One line per row of each table and one per check."""
     for table in outcome.tables:
         for record in table.records():
-            print(json.dumps({"type": "row", "table": table.name, **record}, ensure_ascii=False))
+            print(_line({"type": "row", "table": table.name, **record}))
     for check in outcome.checks:
-        print(json.dumps({"type": "check", **check._asdict(), "met": check.is_met}, ensure_ascii=False))
+        print(_line({"type": "check", **check.record()}))
+
+
+def _line(record: dict[str, str | int | float | bool | None]) -> str:
+    return json.dumps(record, ensure_ascii=False, allow_nan=False)
 
 
 def _write(outcome: Outcome, folder: Path) -> Iterator[Path]:

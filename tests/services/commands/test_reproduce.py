@@ -66,6 +66,33 @@ def test_json_lines(capsys: pytest.CaptureFixture[str]) -> None:
     assert check == {"type": "check", "what": "width", "measured": 1.5, "limit": 2.0, "sense": "at most", "met": True}
 
 
+SHORT = {
+    "p2006.experiment": {"QUICK_STEPS": 30, "QUICK_RUNS": 1},
+    "p2014.experiment": {"QUICK_STEPS": 60, "QUICK_RUNS": 1},
+    "p2018.experiment": {"QUICK_RUNS": 1},
+    "l2019.experiment": {"QUICK_STEPS": 60, "QUICK_RUNS": 1},
+    "p2023.experiment": {"QUICK_STEPS": 30, "QUICK_RUNS": 1},
+}
+"""What makes a part of ``reproduce all --quick`` as short as it can be."""
+LONG = ("p2014.experiment", "p2018.experiment", "l2019.experiment")
+"""Half a minute or more even so."""
+
+
+@pytest.mark.parametrize(
+    "module", [pytest.param(one, marks=[pytest.mark.soak] if one in LONG else []) for one in SHORT]
+)
+def test_every_line_of_a_part_is_json(
+    module: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    what = module.split(".")[0]
+    for name, value in SHORT[module].items():
+        monkeypatch.setattr(f"lsu_mesh.experiments.{module}.{name}", value)
+    assert cli.main(["reproduce", what, "--quick", "--json"]) in (exit_codes.OK, exit_codes.NOT_MET)
+    records = [json.loads(line, parse_constant=pytest.fail) for line in capsys.readouterr().out.splitlines()]
+    assert {record["type"] for record in records} <= {"row", "check"}
+    assert len(records) > 5
+
+
 @pytest.mark.usefixtures("small")
 def test_files_are_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["reproduce", "fusion", "--quick", "--out", str(tmp_path / "new" / "folder")]) == exit_codes.OK

@@ -12,6 +12,12 @@ from lsu_mesh_services.exit_codes import OK
 
 SETS = {"demo": 420, "transfer": 420, "liar": 635, "learning": 990, "every_option": 780}
 """Published sets, by recording."""
+OUTDATED: dict[str, dict[str, int]] = {
+    "demo": {"LSUP algorithm 1, this is 2": 120},
+    "transfer": {"LSUP algorithm 1, this is 2": 120},
+    "every_option": {"LSUP algorithm 1, this is 2": 120, "ZonotopicKalman algorithm 1, this is 2": 120},
+}
+"""Sets whose filter has other bits today, which is said and is no failure."""
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +26,7 @@ def folder(root: Path) -> Path:
 
 
 @pytest.mark.parametrize("name", SETS)
-def test_a_recording_of_version_0_1_verifies_bit_by_bit(
+def test_a_recording_of_version_0_1_verifies_bit_by_bit_where_the_bits_are_the_same(
     folder: Path, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / f"{name}.rrd"
@@ -29,8 +35,11 @@ def test_a_recording_of_version_0_1_verifies_bit_by_bit(
     (found,) = [
         line for line in map(json.loads, capsys.readouterr().out.splitlines()) if line["type"] == "verification"
     ]
-    assert found["exact"] == SETS[name]
-    assert found["different"] == found["unverifiable"] == found["miss_truth"] == 0
+    outdated = OUTDATED.get(name, {})
+    assert found["outdated"] == outdated
+    assert found["unverifiable"] == sum(outdated.values())
+    assert found["exact"] == SETS[name] - sum(outdated.values())
+    assert found["different"] == found["miss_truth"] == 0
 
 
 def test_every_recording_in_the_folder_is_verified(folder: Path) -> None:
