@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import ClassVar, cast
+from typing import ClassVar, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +28,16 @@ from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
+
+Ties = Literal["old", "new"]
+"""Which of two strips of equal width stays in a strip update (Vicino & Zappa 1996)."""
+
+
+def ties_option(ties: Ties) -> int:
+    """The bit of a filter's option; ``ModelError`` for another word."""
+    if ties not in get_args(Ties):
+        raise ModelError(f'ties must be "old" or "new", not {ties!r}')
+    return filter_step.TIES if ties == "new" else 0
 
 
 class CompiledFilter(Filter):
