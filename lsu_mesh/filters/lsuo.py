@@ -73,10 +73,10 @@ class LSUO(CompiledFilter):
     def _make_support(state: Matrix) -> Orthotope:
         return Orthotope.trusted(state[0], state[1])
 
-    def condition(self, support: Support) -> float:
+    def _condition(self, support: Support) -> float:
         """Bayesian transfer that never widens :meth:`bounds`, also where the data update may (``meet=False``)."""
         before, volume = self._state, self._log_volume(self._state)
-        gain = super().condition(support)
+        gain = super()._condition(support)
         if self.meet:
             return gain
         self._state = np.array([np.maximum(self._state[0], before[0]), np.minimum(self._state[1], before[1])])

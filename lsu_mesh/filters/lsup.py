@@ -92,14 +92,14 @@ class LSUP(CompiledFilter):
         self.ties = ties
         self.time_update = time_update
 
-    def condition(self, support: Support) -> float:
+    def _condition(self, support: Support) -> float:
         """Bayesian transfer that never widens :meth:`bounds`, but for rounding; the gain is that of the parallelotopes.
 
         A strip that takes the place of an own one can push the hull out. Where that happens the edges keep their
         directions and are shortened to what the intersection reaches along them, by verified linear programs.
         """
         before, hull, volume = self._state, self._hull(self._state), self._log_volume(self._state)
-        gain = super().condition(support)
+        gain = super()._condition(support)
         if not self._widens(self._state, hull):
             return gain
         box, self._state = self._state[len(hull[0]) + 1 :], before
