@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from typing import ClassVar, cast
+from functools import partial
+from typing import ClassVar, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.filter import Filter, OutputPrediction
+from lsu_mesh.filters.filter import Filter, GainOf, OutputPrediction
 from lsu_mesh.filters.inconsistency import known_to_last_bits, strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.transfer_gain import measured
 from lsu_mesh.filters.validation import (
     KernelModel,
     checked_prior,
@@ -28,6 +30,16 @@ from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
+
+Ties = Literal["old", "new"]
+"""Which of two strips of equal width stays in a strip update (Vicino & Zappa 1996)."""
+
+
+def ties_option(ties: Ties) -> int:
+    """The bit of a filter's option; ``ModelError`` for another word."""
+    if ties not in get_args(Ties):
+        raise ModelError(f'ties must be "old" or "new", not {ties!r}')
+    return filter_step.TIES if ties == "new" else 0
 
 
 class CompiledFilter(Filter):
@@ -127,7 +139,11 @@ class CompiledFilter(Filter):
         self._accept(state, status)
         return self.support
 
-    def condition(self, support: Support) -> float:
+    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+        """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
+        return measured(self, gain, partial(self._condition, support))
+
+    def _condition(self, support: Support) -> float:
         if support.dim != self._model.state_count:
             raise ModelError(f"the set must have {self._model.state_count} coordinates, it has {support.dim}")
         before = self._log_volume(self._state)

@@ -15,6 +15,8 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
 Guarantee = Literal["declared", "learned", "none"]
+GainOf = Literal["support", "hull"]
+"""Whose volumes the gain of a transfer compares."""
 
 
 class OutputPrediction(NamedTuple):
@@ -114,10 +116,12 @@ class Filter(ABC):
         """
 
     @abstractmethod
-    def condition(self, support: Support) -> float:
+    def condition(self, support: Support, gain: GainOf | None = None) -> float:
         """Bayesian transfer: keep ``self ∩ support`` (or a set of this class that holds it).
 
-        Returns the gain ``ln vol(before) − ln vol(after)`` in nats, never negative. ``InconsistentData`` on a proved
+        Returns the gain ``ln vol(before) − ln vol(after)`` in nats, never negative: with ``gain="support"`` of the
+        supports up to three states, else of the hulls; with ``"hull"`` of the interval hulls; by default of what the
+        class measures at no cost. ``InconsistentData`` on a proved
         empty intersection; the filter then keeps the state that it had.
         """
 

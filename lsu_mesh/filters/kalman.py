@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -9,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
+from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
-from lsu_mesh.filters.transfer_gain import hull_gain
+from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -134,7 +135,11 @@ class Kalman(Filter):
         """``C x̂`` as an interval of no width: of a periodic output the multiple nearest to it is taken."""
         return C @ self._held.mean, C @ self._held.mean
 
-    def condition(self, support: Support) -> float:
+    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+        """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
+        return measured(self, gain, partial(self._condition, support))
+
+    def _condition(self, support: Support) -> float:
         """Take the box of ``support`` as a measurement of all states with uniform noise; the gain is of the boxes.
 
         Raises ``InconsistentData`` where the boxes have no point in common.

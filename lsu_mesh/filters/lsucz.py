@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from functools import partial
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -11,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
-from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
+from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
-from lsu_mesh.filters.transfer_gain import hull_gain
+from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
@@ -192,7 +193,11 @@ class LSUCZ(Filter):
         self._hold(held if used.domain is None else _within(held, used.domain))
         return self.support
 
-    def condition(self, support: Support) -> float:
+    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+        """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
+        return measured(self, gain, partial(self._condition, support))
+
+    def _condition(self, support: Support) -> float:
         """Keep ``X ∩ support``; the gain, in nats, is that of the interval hulls.
 
         A set that brings next to nothing, so that reducing the intersection to the limits costs more, changes only the

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
-from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.compiled import CompiledFilter, Ties, ties_option
 from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
@@ -34,6 +34,9 @@ class LSUO(CompiledFilter):
     hull:
         ``"strips"``: hull of the parallelotope that the strip updates leave; ``"lp"``: exact hull of box ∩ strips, by
         2n linear programs with verified bounds.
+    ties:
+        A strip that cuts one face only leaves two parallelotopes of equal volume: ``"old"`` keeps the old edges,
+        ``"new"`` takes the strip, which is nearer to Table 1 of the paper.
 
     Raises ``ModelError`` on options or a prior that do not fit.
     Source: Pavelková & Jirsa 2018, eqs. (8)–(14); Lainová et al. 2019, section 3.1.
@@ -49,10 +52,12 @@ class LSUO(CompiledFilter):
         prior: Support | tuple[ArrayLike, ArrayLike],
         meet: bool = True,
         hull: Literal["strips", "lp"] = "strips",
+        ties: Ties = "old",
     ) -> None:
         if hull not in ("strips", "lp"):
             raise ModelError(f'hull must be "strips" or "lp", not {hull!r}')
-        super().__init__(model, prior, option=int(bool(meet)))
+        super().__init__(model, prior, option=(filter_step.MEET if meet else 0) | ties_option(ties))
+        self.ties = ties
         self.meet = bool(meet)
         self.hull = hull
 
@@ -68,10 +73,10 @@ class LSUO(CompiledFilter):
     def _make_support(state: Matrix) -> Orthotope:
         return Orthotope.trusted(state[0], state[1])
 
-    def condition(self, support: Support) -> float:
+    def _condition(self, support: Support) -> float:
         """Bayesian transfer that never widens :meth:`bounds`, also where the data update may (``meet=False``)."""
         before, volume = self._state, self._log_volume(self._state)
-        gain = super().condition(support)
+        gain = super()._condition(support)
         if self.meet:
             return gain
         self._state = np.array([np.maximum(self._state[0], before[0]), np.minimum(self._state[1], before[1])])

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.compiled import CompiledFilter, Ties, ties_option
 from lsu_mesh.filters.filter import Guarantee
 from lsu_mesh.filters.validation import checked_prior
 from lsu_mesh.kernels import filter_step
@@ -53,6 +53,9 @@ class LSUP(CompiledFilter):
         Whether a box is carried beside the parallelotope, by interval arithmetic over data and time updates and met
         with each hull; :meth:`bounds` are then that box, and :attr:`point` the centre moved into it. They never forget
         what was once known of a constant. The parallelotope takes nothing from the box.
+    ties:
+        A strip of data that cuts one face only leaves two parallelotopes of equal volume: ``"old"`` keeps the old
+        edges, ``"new"`` takes the strip.
 
     Raises ``ModelError`` on options or a prior that do not fit.
 
@@ -74,6 +77,7 @@ class LSUP(CompiledFilter):
         prior: Support | tuple[ArrayLike, ArrayLike],
         time_update: TimeUpdate = "image",
         box: bool = True,
+        ties: Ties = "old",
     ) -> None:
         if time_update not in TIME_UPDATES:
             raise ModelError(f"time_update must be one of {', '.join(TIME_UPDATES)}, not {time_update!r}")
@@ -84,17 +88,18 @@ class LSUP(CompiledFilter):
                 f'the model has {n} and {q}: use "cgz" or "strips"'
             )
         self.has_box = bool(box)
-        super().__init__(model, prior, option=TIME_UPDATES[time_update])
+        super().__init__(model, prior, option=TIME_UPDATES[time_update] | ties_option(ties))
+        self.ties = ties
         self.time_update = time_update
 
-    def condition(self, support: Support) -> float:
+    def _condition(self, support: Support) -> float:
         """Bayesian transfer that never widens :meth:`bounds`, but for rounding; the gain is that of the parallelotopes.
 
         A strip that takes the place of an own one can push the hull out. Where that happens the edges keep their
         directions and are shortened to what the intersection reaches along them, by verified linear programs.
         """
         before, hull, volume = self._state, self._hull(self._state), self._log_volume(self._state)
-        gain = super().condition(support)
+        gain = super()._condition(support)
         if not self._widens(self._state, hull):
             return gain
         box, self._state = self._state[len(hull[0]) + 1 :], before

@@ -93,8 +93,8 @@ class TruncatedKalman(Kalman):
         super().reset(support)
         self._full = self._held
 
-    def condition(self, support: Support) -> float:
-        gain = super().condition(support)
+    def _condition(self, support: Support) -> float:
+        gain = super()._condition(support)
         self._full = self._held
         return gain
 

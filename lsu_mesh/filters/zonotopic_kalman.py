@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -9,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.filter import Filter, Guarantee, OutputPrediction
+from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
-from lsu_mesh.filters.transfer_gain import hull_gain
+from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.parallelotopes.box import keep_constants
 from lsu_mesh.kernels.parallelotopes.bundle import tighten_all
@@ -198,7 +199,11 @@ class ZonotopicKalman(Filter):
         self._held = held
         return self.support
 
-    def condition(self, support: Support) -> float:
+    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+        """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
+        return measured(self, gain, partial(self._condition, support))
+
+    def _condition(self, support: Support) -> float:
         """Keep a zonotope that holds ``X ∩ support``, and the box of ``support``; the gain is that of the hulls.
 
         The faces of the box are offered as strips to the gain; the result is kept where it shrinks the hull, else the

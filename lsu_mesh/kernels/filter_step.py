@@ -2,9 +2,9 @@
 
 A state is a matrix with rows of length n: ``BOX`` lower, upper; ``PARALLELOTOPE`` c, then the n rows of T, and where a
 box is carried beside it, which it takes nothing from, lower, upper; ``BUNDLE`` c, the n rows of T, lower, upper.
-``option`` is, for ``BOX``, whether the hull is met with the prediction, and for ``PARALLELOTOPE`` the kind of time
-update (``kernels/parallelotopes/parallelotope.py``). All families and actions share one compiled function: each further
-one would compile everything below it once more.
+``option`` is, for ``BOX``, ``MEET`` or 0, and for ``PARALLELOTOPE`` the kind of time update
+(``kernels/parallelotopes/parallelotope.py``), in both with ``TIES`` or without. All families and actions share one
+compiled function: each further one would compile everything below it once more.
 """
 
 from __future__ import annotations
@@ -24,6 +24,11 @@ from lsu_mesh.kernels.runtime.scratch import FACTOR, IDENTITY, Scratch, row, squ
 BOX = 0
 PARALLELOTOPE = 1
 BUNDLE = 2
+
+MEET = 1
+"""Option of ``BOX``: the hull is met with the prediction."""
+TIES = 8
+"""Option of ``BOX`` and ``PARALLELOTOPE``: a strip of data takes the place of an own one of equal width."""
 
 UPDATE = 0
 PREDICT = 1
@@ -72,7 +77,7 @@ def advance(
     if interval:
         rows = square(work, n, IDENTITY)
     if action == PREDICT:
-        time_update = option if family == PARALLELOTOPE else STRIPS
+        time_update = option & ~TIES if family == PARALLELOTOPE else STRIPS
         status = _predict_parallelotope(S[0], S[1 : n + 1], A, B, u, G, widths, time_update, c, T, work)
         low, high = row(work, n, BUNDLE_ROW), row(work, n, BUNDLE_ROW + 1)
         if status == 0 and (boxed or family == BUNDLE):  # the hull of the image is exact: tighter than that of the set
@@ -85,7 +90,8 @@ def advance(
         time_update = STRIPS
         copy(S[0 : n + 1], new[0 : n + 1])
     if status == 0 and time_update == STRIPS and (family == PARALLELOTOPE or action == UPDATE):
-        status = cut_all(c, T, rows, low, high, interval, work)
+        ties = family == PARALLELOTOPE and action == UPDATE and option & TIES != 0
+        status = cut_all(c, T, rows, low, high, interval, ties, work)
     if status != 0 or (family == PARALLELOTOPE and not boxed):
         return status
     if boxed:
@@ -113,7 +119,7 @@ def _advance_box(
     if action == PREDICT:
         return _predict_box(S[0], S[1], A, B, u, G, widths, new[0], new[1], work)
     if action == UPDATE and not in_bundle:
-        return _update_box(S[0], S[1], P, first, second, option != 0, new[0], new[1], work)
+        return _update_box(S[0], S[1], P, first, second, option & MEET != 0, option & TIES != 0, new[0], new[1], work)
     copy(S, new)
     if action == UPDATE:
         return tighten_all(new[0], new[1], P, first, second)

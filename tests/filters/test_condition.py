@@ -82,7 +82,7 @@ def test_a_parallelotope_whose_hull_a_strip_would_push_out_is_shortened_instead(
     square = Orthotope([-1.0, -1.0], [1.0, 1.0])
     other = Parallelotope([0.6, -0.6], [[0.6, 0.05], [-0.6, 0.05]])
     free, kept = LSUP(model, square), LSUP(model, square)
-    CompiledFilter.condition(free, other)
+    CompiledFilter._condition(free, other)
     assert free.support.bounds()[0][1] == pytest.approx(-1.1)
     assert kept.condition(other) == pytest.approx(np.log(4.0 / (1.05 * 1.05)))
     lower, upper = kept.bounds()

@@ -129,16 +129,16 @@ class ShrunkPrediction(LSUO):
 class ShrunkTransfer(LSUO):
     """Takes a transferred set for an independent measurement, and halves what both say."""
 
-    def condition(self, support: Support) -> float:
-        gain = super().condition(support)
+    def _condition(self, support: Support) -> float:
+        gain = super()._condition(support)
         middle = self._state.mean(axis=0)
         self._state = middle + 0.5 * (self._state - middle)
         return gain
 
 
 class WideningTransfer(LSUO):
-    def condition(self, support: Support) -> float:
-        gain = super().condition(support)
+    def _condition(self, support: Support) -> float:
+        gain = super()._condition(support)
         self._state = self._state + np.array([[-1.0], [1.0]]) * np.abs(self._state).max()
         return gain
 

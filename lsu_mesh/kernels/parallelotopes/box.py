@@ -84,13 +84,14 @@ def keep_constants(
 
 @inlined
 def update(
-    lower: Vector, upper: Vector, C: Matrix, y: Vector, r: Vector, meet: bool,
+    lower: Vector, upper: Vector, C: Matrix, y: Vector, r: Vector, meet: bool, takes_ties: bool,
     new_lower: Vector, new_upper: Vector, work: Scratch,
 ) -> int:  # fmt: skip
     """Data update: the strips ``|y − C x| ≤ r`` cut the box as a parallelotope; interval hull; meet with the box.
 
     C (m, n), y (m,) with NaN for a missing entry, r (m,). Without ``meet`` the hull may exceed the prior (Pavelková &
-    Jirsa 2018, eqs. 11–13). Returns 0, ``OVERFLOW``, or k + 1 where the strip of row k is proved to miss the set.
+    Jirsa 2018, eqs. 11–13). ``takes_ties``: as in :func:`cut`. Returns 0, ``OVERFLOW``, or k + 1 where the strip of
+    row k is proved to miss the set.
     """
     n = lower.size
     c, delta, T = row(work, n, BOX), row(work, n, DELTA), square(work, n, BODY)
@@ -105,7 +106,7 @@ def update(
     touched, last = False, 0
     for k in range(y.size):
         if not math.isnan(y[k]):
-            status = cut(c, T, delta, C[k], down(y[k] - r[k]), up(y[k] + r[k]), strips)
+            status = cut(c, T, delta, C[k], down(y[k] - r[k]), up(y[k] + r[k]), takes_ties, strips)
             if status == EMPTY:
                 return k + 1
             touched = touched or status != UNCHANGED

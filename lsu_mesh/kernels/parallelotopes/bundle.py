@@ -26,7 +26,7 @@ def tighten_each_other(c: Vector, T: Matrix, lower: Vector, upper: Vector, work:
     """
     n = c.size
     interval = n > 0  # always; a literal would compile cut_all a second time
-    status = cut_all(c, T, square(work, n, IDENTITY), lower, upper, interval, work)
+    status = cut_all(c, T, square(work, n, IDENTITY), lower, upper, interval, not interval, work)
     if status != 0:
         return status
     hull_lower, hull_upper = row(work, n, BUNDLE), row(work, n, BUNDLE + 1)

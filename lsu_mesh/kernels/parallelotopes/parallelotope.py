@@ -81,7 +81,9 @@ def image(c: Vector, T: Matrix, A: Matrix, B: Matrix, u: Vector, new_c: Vector, 
 
 
 @inner
-def cut_all(c: Vector, T: Matrix, P: Matrix, first: Vector, second: Vector, interval: bool, work: Scratch) -> int:
+def cut_all(
+    c: Vector, T: Matrix, P: Matrix, first: Vector, second: Vector, interval: bool, takes_ties: bool, work: Scratch
+) -> int:  # fmt: skip
     """Cut by strips in the order of the rows of P (m, n), in place (the set is spoilt where the status is not 0).
 
     The strips are ``first ≤ P x ≤ second`` where ``interval``, else ``|first − P x| ≤ second``; NaN is no strip.
@@ -97,7 +99,7 @@ def cut_all(c: Vector, T: Matrix, P: Matrix, first: Vector, second: Vector, inte
         if not math.isnan(first[k]):
             low = first[k] if interval else down(first[k] - second[k])
             high = second[k] if interval else up(first[k] + second[k])
-            status = cut(c, T, delta, P[k], low, high, strips)
+            status = cut(c, T, delta, P[k], low, high, takes_ties, strips)
             if status == EMPTY:
                 return k + 1
             touched = touched or status != UNCHANGED

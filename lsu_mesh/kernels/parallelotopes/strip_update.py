@@ -24,7 +24,7 @@ STRIP_ROWS = 3
 """Rows of length n that :func:`cut` needs as scratch."""
 
 TIE = 1.0 + 1e-9
-"""A strip that cuts one face only leaves two choices of equal volume: rounding must not decide, the old edges stay."""
+"""A strip that cuts one face only leaves two choices of equal volume: rounding must not decide between them."""
 
 MIN_DIVISOR = 1e-150
 """Below it an edge is never replaced: the quotients could overflow."""
@@ -68,12 +68,15 @@ def project(c: Vector, T: Matrix, delta: Vector, p: Vector, g: Vector) -> tuple[
 
 
 @inner
-def cut(c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, work: Matrix) -> int:
+def cut(
+    c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, takes_ties: bool, work: Matrix
+) -> int:  # fmt: skip
     """Replace the set by one of the same form that holds its part in the strip ``lo ≤ p'x ≤ hi``; in place.
 
     Tightens the n strips of the parallelotope and the new one, and drops the widest of them, so that the volume never
-    grows. Returns ``EMPTY`` (proved; the set is then untouched), ``UNCHANGED`` (the strip does not cut), ``TIGHTENED``
-    or ``REPLACED``. ``work`` has ``STRIP_ROWS`` rows of length n. Source: Vicino & Zappa 1996.
+    grows; where both have one width, the new one is dropped, or the old one if it ``takes_ties``. Returns ``EMPTY``
+    (proved; the set is then untouched), ``UNCHANGED`` (the strip does not cut), ``TIGHTENED`` or ``REPLACED``. ``work``
+    has ``STRIP_ROWS`` rows of length n. Source: Vicino & Zappa 1996.
     """
     g, mid, half = work[0], work[1], work[2]
     s, error, spread = project(c, T, delta, p, g)
@@ -88,7 +91,8 @@ def cut(c: Vector, T: Matrix, delta: Vector, p: Vector, lo: float, hi: float, wo
         return EMPTY
     low = max(low, -spread)
     high = min(high, spread)
-    if widest > (high - low) * TIE and abs(g[k]) > MIN_DIVISOR:
+    takes = widest * TIE >= high - low if takes_ties else widest > (high - low) * TIE
+    if takes and abs(g[k]) > MIN_DIVISOR:
         _replace_edge(c, T, delta, k, low, high, g, mid, half)
         return REPLACED
     if tightened:

@@ -36,7 +36,7 @@ class Cut(NamedTuple):
 
 def cut(c: np.ndarray, T: np.ndarray, p: np.ndarray, lo: float, hi: float) -> Cut:
     new_c, new_T, delta = c.copy(), T.copy(), np.zeros(len(c))
-    status = cut_in_place(new_c, new_T, delta, p, lo, hi, np.zeros((strip_update.STRIP_ROWS, len(c))))
+    status = cut_in_place(new_c, new_T, delta, p, lo, hi, False, np.zeros((strip_update.STRIP_ROWS, len(c))))
     return Cut(c, T, p, lo, hi, status, new_c, new_T, delta)
 
 
