@@ -231,8 +231,9 @@ def most_generators(configuration: Configuration) -> int:
     limits = [settings.max_generators for settings in configuration.fusion.values()]
     for settings in configuration.filters.values():
         options = settings.options
-        limits.append(options.get("max_generators", 20) or UNLIMITED)
-        limits.append(int(options.get("order", 15) or UNLIMITED) * model.state_count)
+        n, is_unlimited = model.state_count, options.get("reduce") is False
+        limits.append(UNLIMITED if is_unlimited else options.get("max_generators") or max(20, 3 * n))
+        limits.append(UNLIMITED if is_unlimited else int(options.get("order") or max(15, 3 * n)) * n)
     return min(UNLIMITED, 2 * max(limits, default=0) + 2 * model.state_count + model.rho.size + 64)
 
 
