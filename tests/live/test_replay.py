@@ -21,6 +21,7 @@ pytestmark = pytest.mark.live
 until_recorded = functools.partial(until, what="the recorder has written it", timeout=120, pause=0.2)
 
 
+@pytest.mark.timeout(900)  # all that it waits for, where each takes as long as it may
 def test_a_run_in_which_a_filter_and_the_recorder_are_killed_is_exact(start_run, start) -> None:  # type: ignore[no-untyped-def]
     session = start_run("--steps", "100000", "--record", "killed.rrd")
     first, second = session.folder / "killed.rrd", session.folder / "killed.part2.rrd"
