@@ -1,4 +1,4 @@
-"""Data between the steps that see jumping inputs, by a feedthrough or by the error of their time, mixed with transfers."""
+"""Data between the steps that see jumping inputs, by feedthrough or time error, mixed with transfers."""
 
 from __future__ import annotations
 
