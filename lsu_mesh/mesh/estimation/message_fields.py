@@ -26,10 +26,15 @@ def described(engine: Filter) -> dict[str, Any]:
     }
 
 
-def foretold(engine: Filter) -> dict[str, Any]:
-    """The fields of a prediction that the engine's set and its outputs give."""
+def can_foretell(engine: Filter, input_box: Orthotope | None) -> bool:
+    """Whether outputs can be bounded before the input that they see has come."""
+    return engine.model.D is None or input_box is not None
+
+
+def foretold(engine: Filter, input_box: Orthotope | None) -> dict[str, Any]:
+    """What a prediction says of the engine's set and its outputs, which may see any input of the box."""
     lower, upper = engine.bounds()
-    band = engine.predict_output()
+    band = engine.predict_output() if engine.model.D is None else engine.predict_output(input_box)
     return {
         "lower": lower.tolist(),
         "upper": upper.tolist(),

@@ -16,7 +16,7 @@ from lsu_mesh.mesh.estimation.filter_step import (
     filter_step,
 )
 from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
-from lsu_mesh.mesh.estimation.message_fields import described, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.message_fields import can_foretell, described, finite_or_none, foretold
 from lsu_mesh.mesh.estimation.received_data import ReceivedData
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
 from lsu_mesh.mesh.estimation.step_data import BEFORE_PRIOR, StepData, Unused
@@ -374,12 +374,14 @@ class FilterNode(Estimator):
         )
 
     def prediction(self, k: int, now: int) -> list[Message]:
+        if not can_foretell(self.engine, self.configuration.input_box):
+            return []
         held = self.held
         is_input_known = self.timeline.has_input(k - 1) or not self.engine.model.input_count
         return [
             Prediction(
                 **self.stamp("prediction", k, now),
-                **foretold(self.engine),
+                **foretold(self.engine, self.configuration.input_box),
                 support=to_message(self.engine.support),
                 epoch=held.epochs.number,
                 descent=held.descent,

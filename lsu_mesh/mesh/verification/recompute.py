@@ -107,7 +107,13 @@ class Recomputation(ABC):
         elif (k := self._hold_base(recorded, recorded.base)) < recorded.step:
             predict_step(self._engine, self._configuration, k, *self._own_inputs(recorded))
         bounds = {} if recorded.bounds is None else {"bounds": self._noise_bounds()}
-        return Recomputed({**foretold(self._engine), **bounds, "support": to_message(self._engine.support)})
+        return Recomputed(
+            {
+                **foretold(self._engine, self._configuration.input_box),
+                **bounds,
+                "support": to_message(self._engine.support),
+            }
+        )
 
     def _check_algorithm(self, recorded: Posterior | Prediction) -> None:
         """Sets of another arithmetic have other bits."""
