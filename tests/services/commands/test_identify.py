@@ -73,7 +73,7 @@ def test_a_wrong_sensor_and_missing_data_are_said(
 
 
 def test_data_between_the_steps_are_refused_by_name(mesh: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = mesh.read_text().replace('step = "step"', 'time = "t"')
+    text = mesh.read_text().replace('step = "step"', 'time = "t"').replace("dt = 1.0", "dt = 1.0\nstart_time = 0.0")
     mesh.write_text(text)
     (mesh.parent / "s.csv").write_text("t,y\n1.0,0.5\n2.0,0.5\n3.25,0.5\n")
     assert main(["identify", str(mesh)]) == USAGE
