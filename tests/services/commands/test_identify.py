@@ -70,3 +70,15 @@ def test_a_wrong_sensor_and_missing_data_are_said(
     assert "there is no sensor 't'" in capsys.readouterr().err
     assert main(["identify", str(demo)]) == USAGE
     assert "no sensor has data" in capsys.readouterr().err
+
+
+def test_data_between_the_steps_are_refused_by_name(mesh: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = mesh.read_text().replace('step = "step"', 'time = "t"').replace("dt = 1.0", "dt = 1.0\nstart_time = 0.0")
+    mesh.write_text(text)
+    (mesh.parent / "s.csv").write_text("t,y\n1.0,0.5\n2.0,0.5\n3.25,0.5\n")
+    assert main(["identify", str(mesh)]) == USAGE
+    said = capsys.readouterr().err
+    assert "off the grid" in said or "a measurement of s lies up to 750 ms from step 4" in said
+    (mesh.parent / "s.csv").write_text("t,y\n1.0,0.5\n2.0,0.5\n2.0,0.75\n")
+    assert main(["identify", str(mesh)]) == USAGE
+    assert "a measurement of s is not the only one of step 2" in capsys.readouterr().err
