@@ -92,7 +92,7 @@ class Estimator(StartingNode):
         if step is None:
             self._counts["late"] += 1
             return
-        if isinstance(message, Measurement) and not step.takes(message):
+        if isinstance(message, Measurement) and source in self.sources and not step.takes(message):
             return
         step.arrived[source] = message
         if self.current is not None and self.timeline.is_over(message.step):
