@@ -75,7 +75,7 @@ AT_ONCE = 100
 
 
 @pytest.fixture(scope="module")
-def heard(module_mesh: Callable[..., Any]) -> Any:
+def received(module_mesh: Callable[..., Any]) -> Any:
     """What was said in a mesh of 2000 steps whose estimators keep up."""
     mesh = module_mesh("mesh.steps=2000", "mesh.rate=40.0", 'fusion.main.sources=["box","para"]')
     mesh.kill("cz")
