@@ -129,7 +129,7 @@ def test_a_bundle_does_not_elongate() -> None:
     data = simulate(model, 400, seed=1)
     runs = [
         run_filter(make(model, prior_of(model)), data.Y, data.U)
-        for make in (LSUPB, lambda m, p: LSUP(m, p, time_update="strips"))
+        for make in (LSUPB, lambda m, p: LSUP(m, p, time_update="strips", box=False))
     ]
     bundle, strips = [metrics.mean_width(run.lower[200:], run.upper[200:]).max() for run in runs]
     assert bundle < strips / 2

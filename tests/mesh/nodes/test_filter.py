@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 from lsu_mesh.mesh.keys import key, last_key
@@ -200,7 +201,9 @@ def test_with_nothing_sound_to_start_again_from_a_reset_is_impossible_and_said(m
     assert max(mesh.newest("box")) == 100
 
 
-def test_the_first_value_of_a_sensor_and_step_counts(mesh_of: MakeMesh) -> None:
+def test_another_value_of_a_sensor_and_step_is_a_datum_of_its_own_and_named_where_it_contradicts(
+    mesh_of: MakeMesh,
+) -> None:
     mesh = mesh_of(f"mesh.steps={STEPS}")
     mesh.run(0.3)
     first = next(m for m in mesh.of(Measurement, "s1") if m.step == 5)
@@ -208,10 +211,12 @@ def test_the_first_value_of_a_sensor_and_step_counts(mesh_of: MakeMesh) -> None:
         v=1, src=first.src, boot="f" * 16, seq=0, step=5, sent_ns=1, origin_ns=1, model=first.model, y=[99.0], time_ns=0
     )
     mesh.hand_over(key("demo", "measurement", "s1"), encode(other))
-    (event,) = [e for e in mesh.events("measurement-changed") if e.name == "box"]
-    assert event.about == {"sensor": "s1", "step": 5}
     mesh.turn()
-    assert all(p.revision == 0 for p in mesh.posteriors("box"))
+    (event,) = [e for e in mesh.events("contradiction") if e.name == "box"]
+    assert (event.about["sensor"], event.about["step"], event.about["y"]) == ("s1", 5, 99.0)
+    truth = mesh.truth()
+    assert all((np.array(p.lower) <= truth[p.step]).all() for p in mesh.posteriors("box"))
+    assert all((truth[p.step] <= np.array(p.upper)).all() for p in mesh.posteriors("box"))
 
 
 def test_a_filter_that_starts_late_joins_from_the_fused_set_and_holds_the_truth(mesh_of: MakeMesh) -> None:
