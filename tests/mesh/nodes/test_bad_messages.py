@@ -16,6 +16,7 @@ import msgpack
 import numpy as np
 import psutil
 import pytest
+from garbage_collections import Collections
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -230,23 +231,6 @@ class Hostile:
             return {"type": "zonotope", "center": lower, "generators": generators}
         A, b = np.ones((2, columns)).tolist(), box[0, :2].tolist()
         return {"type": "constrained_zonotope", "center": lower, "generators": generators, "A": A, "b": b}
-
-
-class Collections:
-    """Processor time that garbage collections have taken so far: they are the whole process's, not one message's."""
-
-    def __init__(self) -> None:
-        self.took_ns = self._began = 0
-        gc.callbacks.append(self._record)
-
-    def _record(self, phase: str, about: dict[str, int]) -> None:
-        if phase == "start":
-            self._began = time.thread_time_ns()
-        else:
-            self.took_ns += time.thread_time_ns() - self._began
-
-    def end(self) -> None:
-        gc.callbacks.remove(self._record)
 
 
 def assault(configuration: Configuration, node: Node, seed: int, count: int) -> list[int]:

@@ -76,7 +76,7 @@ def test_a_posterior_can_be_recomputed_from_its_base_and_what_it_used(mesh, name
         if posterior.base != "prior":
             base = by_reference[posterior.base]
             assert isinstance(base, Posterior)
-            engine.reset(to_support(base.support))
+            engine.resume(to_support(base.support), np.array(base.lower), np.array(base.upper))
         y = np.full(len(rows), np.nan)
         for reference in posterior.used:
             message = by_reference[reference]
