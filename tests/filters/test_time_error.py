@@ -95,8 +95,8 @@ def test_held_inputs() -> None:
     inputs = HeldInputs([10, 20], [np.array([1.0]), np.array([3.0])], before=Orthotope([-1.0], [0.0]))
     assert inputs.at(20) == np.array([3.0])
     pieces = list(inputs.pieces(5, 30))
-    assert [length for length, _ in pieces] == [5, 10, 10]
-    assert [u for _, u in pieces[1:]] == [np.array([1.0]), np.array([3.0])]
+    assert [length for length, *_ in pieces] == [5, 10, 10]
+    assert [u for _, u, *_ in pieces[1:]] == [np.array([1.0]), np.array([3.0])]
     assert isinstance(pieces[0][1], Orthotope)
     hull = inputs.hull(5, 20)
     assert isinstance(hull, Orthotope)
