@@ -78,12 +78,14 @@ def test_the_full_bench_covers_the_sizes_that_are_demanded() -> None:
     assert FULL.instances == 10_000
 
 
-@pytest.mark.parametrize("kind", [LSUO, LSUP])
+@pytest.mark.parametrize(("kind", "options"), [(LSUO, {}), (LSUP, {"box": False})])
 @pytest.mark.parametrize("n", [2, 3, 6])
-def test_plain_numpy_does_what_the_compiled_filter_does(kind: Callable[..., Any], n: int) -> None:
+def test_plain_numpy_does_what_the_compiled_filter_does(
+    kind: Callable[..., Any], options: dict[str, bool], n: int
+) -> None:
     model = stable_model(n)
     data = simulate(model, 40, seed=3)
-    compiled = run_filter(kind(model, unit_box(n)), data.Y, data.U)
+    compiled = run_filter(kind(model, unit_box(n), **options), data.Y, data.U)
     plain = plain_run(kind.__name__, model, data, 40)
     for name in ("lower", "upper", "y_lower", "y_upper"):
         expected = np.array([getattr(row, name) for row in plain])

@@ -41,7 +41,7 @@ def test_a_class_in_the_working_folder_is_not_found_and_the_remedy_is_told(
     result = run([*lsu_mesh_command, "validate", "mesh.toml"], folder)
     assert result.returncode == 2
     assert (
-        "mesh.toml: [filters.box] kind: the filter 'own_filters:Mine': there is no module 'own_filters'"
+        "mesh.toml: line 34: [filters.box] kind: the filter 'own_filters:Mine': there is no module 'own_filters'"
         in result.stderr
     )
     assert "PYTHONPATH" in result.stderr

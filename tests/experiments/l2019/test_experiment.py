@@ -30,7 +30,7 @@ def test_the_criteria_are_those_of_single_filters_step_by_step() -> None:
     data = simulate_all(models, JOB.draws(), START)
     row, run = 1, 1
     i = row * JOB.runs + run
-    box, body = LSUO(models[row], prior(models[row]), meet=False), LSUP(models[row], prior(models[row]))
+    box, body = LSUO(models[row], prior(models[row]), meet=False), LSUP(models[row], prior(models[row]), box=False)
     volumes, nested, smaller, shares, errors = [], [], [], [], [[], []]
     for k in range(JOB.steps):
         intervals = [single.predict_output() for single in (box, body)]
@@ -66,7 +66,7 @@ def test_the_share_of_a_volume_is_that_of_samples() -> None:
     inside, signed = overlap(job)
     model = job.models()[0]
     data = simulate_all([model], job.draws(), START)
-    box, body = LSUO(model, prior(model), meet=False), LSUP(model, prior(model))
+    box, body = LSUO(model, prior(model), meet=False), LSUP(model, prior(model), box=False)
     for k in range(50):
         if k:
             box.predict(data.U[0, k - 1])
