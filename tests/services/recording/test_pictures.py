@@ -88,6 +88,8 @@ r = [0.3, 0.3, 0.3]
 [filters.zonotope]
 kind = "ZonotopicKalman"
 sensors = ["xy", "height", "flow"]
+box = false
+scaled = false
 [filters.cz]
 kind = "LSUCZ"
 sensors = ["xy", "height"]
