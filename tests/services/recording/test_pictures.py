@@ -88,7 +88,7 @@ r = [0.3, 0.3, 0.3]
 [filters.zonotope]
 kind = "ZonotopicKalman"
 sensors = ["xy", "height", "flow"]
-box = false
+box = false      # with its box the fused bounds are this filter's, and lie upon them
 scaled = false
 [filters.cz]
 kind = "LSUCZ"
