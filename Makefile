@@ -35,6 +35,7 @@ lint: $(READY) ## ruff and mypy
 
 soak: $(READY) ## the heavy checks at full size (hours)
 	$(BIN)/python -m pytest -q -m soak
+	$(BIN)/python -m pytest -q -n logical --dist loadfile --hypothesis-profile=new -m "not (soak or live or viewer or alone)"
 
 bench: $(READY) ## speed of filters and hulls beside other libraries, as ratios
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[bench,plots]"

@@ -5,9 +5,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+
+hypothesis.settings.register_profile("same", derandomize=True, database=None)
+hypothesis.settings.register_profile("new", print_blob=True)
+hypothesis.settings.load_profile("same")
+"""Ordinary runs draw the same cases each time; ``--hypothesis-profile=new``, as in ``make soak``, draws new ones."""
 
 
 @pytest.fixture(scope="session")

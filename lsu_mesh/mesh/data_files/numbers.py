@@ -103,15 +103,21 @@ def _converted(cells: CellTexts, asked: Flags) -> tuple[Vector, Flags]:
         wrong |= asked & is_too_long(cells)
     try:
         if asked.all() and not wrong.any():
-            return cells.astype(np.float64), wrong
+            return _doubles(cells), wrong
         good = asked & ~wrong
-        values[good] = cells[good].astype(np.float64)
+        values[good] = _doubles(cells[good])
     except ValueError:
         at = np.flatnonzero(asked & ~wrong)
         wrong[at] = [_NUMBER.fullmatch(cell) is None for cell in cells[at].tolist()]
         good = asked & ~wrong
-        values[good] = cells[good].astype(np.float64)
+        values[good] = _doubles(cells[good])
     return values, wrong
+
+
+def _doubles(cells: CellTexts) -> Vector:
+    """Decimal text as the nearest doubles; what is too large for one becomes ±inf, which the caller reports."""
+    with np.errstate(over="ignore"):
+        return cells.astype(np.float64)
 
 
 def _record_texts(

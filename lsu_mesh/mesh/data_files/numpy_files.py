@@ -108,9 +108,9 @@ class NumpyFile:
         if array.ndim == 1 and kind in "iu":
             return TypedColumn(name, array.astype(np.int64), array > np.iinfo(np.int64).max)
         if array.ndim == 1 and kind == "f":
-            narrow = (
-                array.astype(np.float64) if array.dtype.itemsize > 8 else array.astype(array.dtype.newbyteorder("="))
-            )
+            dtype = np.dtype(np.float64) if array.dtype.itemsize > 8 else array.dtype.newbyteorder("=")
+            with np.errstate(over="ignore"):  # what is too large becomes inf, which is refused by name
+                narrow = array.astype(dtype)
             return TypedColumn(name, narrow, np.isnan(narrow))
         raise self._problems.fail(
             f"holds {array.dtype} of {array.ndim} dimensions; expected numbers", f"column {name!r}"

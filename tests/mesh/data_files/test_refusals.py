@@ -39,6 +39,7 @@ LONG = "".join(f"{i},2.25\n" for i in range(9))
         ),
         ("t,y\n1,1_0\n", "line 2, column 'y': expected a number or nothing (= missing), found '1_0'; write the number"),
         ("t,y\n1,0x1f\n", "line 2, column 'y': expected a number or nothing (= missing), found '0x1f'"),
+        ("t,y\n1,1.79769313486231580e325\n", "line 2, column 'y': '1.79769313486231580e325' is too large for a number"),
         ("t,y\n1,1e999\n", "line 2, column 'y': '1e999' is too large for a number of 64 bits"),
         ("t,y\n1,1-2\n", "line 2, column 'y': expected a number or nothing (= missing), found '1-2'"),
         (

@@ -112,6 +112,12 @@ def test_a_step_that_is_no_whole_number_is_refused(tmp_path: Path) -> None:
         read(settings_of(path, index="step"))
 
 
+def test_what_is_too_large_for_64_bits_is_refused_by_name(tmp_path: Path) -> None:
+    path = written(tmp_path / "data.npz", {"step": [1, 2], "y": np.array(["1", "1e4000"]).astype(np.longdouble)})
+    with pytest.raises(DataFileError, match=r"column 'y'.*inf"):
+        read(settings_of(path, index="step"))
+
+
 def test_archives_that_are_no_data_are_named(tmp_path: Path) -> None:
     for name, word in (("[Content_Types].xml", "an Excel workbook"), ("notes.txt", "a zip archive without arrays")):
         with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
