@@ -43,7 +43,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh.kernels.zonotopes": [
         ("zonotope", "lifted_zonotope"),
-        ("constrained_zonotope", "constraint_elimination", "generator_reduction", "time_update"),
+        ("constrained_zonotope", "constraint_elimination", "generator_reduction", "time_update", "parallel_generators"),
         ("complexity_reduction", "zonotopic_kalman"),
     ],
     "lsu_mesh.supports": [

@@ -74,6 +74,7 @@ class LSUCZ(Filter):
     """
 
     kind: ClassVar[str] = "LSUCZ"
+    algorithm: ClassVar[int] = 3
     guarantee: ClassVar[Guarantee] = "declared"
     _held: Held
     _support: ConstrainedZonotope | None
@@ -99,8 +100,6 @@ class LSUCZ(Filter):
         self._arrays = kernel_model(model)
         if max_generators is None:
             max_generators = max(GENERATORS, GENERATORS_PER_STATE * n)
-            if reduce and max_generators > GENERATORS:  # it was GENERATORS for models of all sizes once
-                vars(self)["algorithm"] = max(2, type(self).algorithm)
         self._limits = Limits(max_generators, max_constraints) if reduce else Limits(None, None)
         self._point_rule = point
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))

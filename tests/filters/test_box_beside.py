@@ -116,7 +116,7 @@ def test_rows_one_after_the_other_give_the_optimal_gain(seed: int) -> None:
     np.testing.assert_allclose(kalman_gain(scale * H, C, scale * r), expected, rtol=1e-8, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", [name for name in MADE if name != "LSUP cgz"])
+@pytest.mark.parametrize("name", MADE)
 @pytest.mark.parametrize("seed", range(4))
 def test_units_of_the_states_do_not_matter(name: str, seed: int) -> None:
     make, plain = MADE[name], systems.get("P3")

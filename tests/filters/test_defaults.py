@@ -31,9 +31,3 @@ def test_the_complexity_grows_with_the_states(kind: Callable[..., Filter], least
     assert ((usual_run.lower <= data.X) & (usual_run.upper >= data.X)).all()
     run_filter(all_kept, data.Y)
     assert all_kept.support.generators.shape[1] >= usual.support.generators.shape[1]
-
-
-def test_a_default_that_has_grown_is_told_by_the_number_of_the_arithmetic() -> None:
-    assert LSUCZ(chain(6), Orthotope([-1.0] * 6, [1.0] * 6)).algorithm == LSUCZ.algorithm
-    assert LSUCZ(chain(7), Orthotope([-1.0] * 7, [1.0] * 7)).algorithm == LSUCZ.algorithm + 1
-    assert LSUCZ(chain(7), Orthotope([-1.0] * 7, [1.0] * 7), 20).algorithm == LSUCZ.algorithm

@@ -29,6 +29,9 @@ from lsu_mesh.kernels.runtime.scratch import (
 
 MAX_COMBINATIONS = 924.0
 """Combinations that an exhaustive search tries: those of 6 among 12 edges. More come of unknown inputs only."""
+TIE = 1e-9
+"""Edges are exchanged for more than so much of the logarithm of the volume: a tie is not decided by rounding, which
+depends on the units of the states."""
 
 
 @inner
@@ -90,7 +93,7 @@ def _swap(edges: Matrix, inverse: Matrix, candidates: Matrix, q: int, alpha: Vec
             for j in range(n):
                 if j != k:
                     volume += math.log(alpha[k] + alpha[j])
-            if volume < least:
+            if volume < least - TIE:
                 dropped, least = k, volume
     for j in range(n):
         if j == dropped:
@@ -118,7 +121,7 @@ def _find_best(
             for i in range(n):
                 edges[i, j] = candidates[i, int(chosen[j])]
         volume = _log_volume_along(edges, candidates, count, inverse, factor)
-        if volume < least:
+        if volume < least - TIE:
             least = volume
             for j in range(n):
                 best[j] = chosen[j]

@@ -24,7 +24,7 @@ STRIP_ROWS = 3
 """Rows of length n that :func:`cut` needs as scratch."""
 
 TIE = 1.0 + 1e-9
-"""A strip that cuts one face only leaves two choices of equal volume: rounding must not decide between them."""
+"""Strips that are equally wide are choices of equal volume: rounding, which depends on units, must not decide."""
 
 MIN_DIVISOR = 1e-150
 """Below it an edge is never replaced: the quotients could overflow."""
@@ -123,7 +123,7 @@ def _tighten(g: Vector, low: float, high: float, spread: float, mid: Vector, hal
             tightened = tightened or a > -1.0 or b < 1.0
         mid[j] = middle(a, b)
         half[j] = half_width(a, b, mid[j])
-        if slope * (b - a) > widest:
+        if slope * (b - a) > widest * TIE:
             k, widest = j, slope * (b - a)
     return k, widest, tightened
 

@@ -2,8 +2,9 @@
 
 1. The variables are rescaled to their ranges over the set, which linear programs have found: that changes
    nothing in the set, and a variable forgotten or a column boxed later then costs what it really spans.
-2. Constraints are eliminated, the least harmful first, each with one generator.
-3. Generators of the lifted zonotope are reduced, and all rounding is enclosed.
+2. Parallel generators of the lifted zonotope become one, now and after step 3: that costs nothing.
+3. Constraints are eliminated, the least harmful first, each with one generator.
+4. Generators of the lifted zonotope are reduced, and all rounding is enclosed.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from lsu_mesh.kernels.zonotopes.lifted_zonotope import (
     unlift,
     without_zero_columns,
 )
+from lsu_mesh.kernels.zonotopes.parallel_generators import merge_parallel
 from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
 
 
@@ -49,9 +51,13 @@ def reduce_complexity(
     if max_generators >= 0:
         wanted = min(wanted, max_generators - n)
     scale_constraints(n, L, middle, slack)
+    L = merge_parallel(L, slack)
+    dropped = L.shape[0] - n > wanted
     while L.shape[0] - n > wanted:
         L, middle, slack = drop_constraint(n, L, middle, slack)
         scale_constraints(n, L, middle, slack)
+    if dropped:
+        L = merge_parallel(L, slack)
     if max_generators >= 0:
         return unlift(n, reduce_columns(L, slack, max_generators), middle)
     c, G, A, b = unlift(n, L, middle)

@@ -54,10 +54,6 @@ MAX_KEPT = 8192
 """So many states are remembered of a filter whose messages do not tell all that it holds."""
 
 
-class OtherAlgorithm(Unverifiable):
-    """A set was computed by another arithmetic than this one's."""
-
-
 class Recomputation(ABC):
     """Recomputes the sets of one peer. ``configuration`` is that of the run."""
 
@@ -80,7 +76,6 @@ class Recomputation(ABC):
         Raises :class:`Unverifiable` where something of it is not in the recording, :class:`DoesNotFit` where it
         contradicts itself.
         """
-        self._check_algorithm(recorded)
         first = self._hold_base(recorded, recorded.base)
         steps = provenance_steps(recorded, first, self._archive)
         found, is_widened = Recomputed({}), False
@@ -99,7 +94,6 @@ class Recomputation(ABC):
 
     def prediction(self, recorded: Prediction) -> Recomputed:
         """What a prediction has by its base and the input of the step before."""
-        self._check_algorithm(recorded)
         if recorded.base is None:  # of an older peer, which does not say what it was made from
             before = self._archive.posterior_before(recorded)
             self._hold(before)
@@ -115,12 +109,11 @@ class Recomputation(ABC):
             }
         )
 
-    def _check_algorithm(self, recorded: Posterior | Prediction) -> None:
-        """Sets of another arithmetic have other bits."""
+    def other_algorithm(self, recorded: Posterior | Prediction) -> str | None:
+        """The number of the arithmetic that computed a set, in words, where it is not today's: its bits may differ."""
         what, number = self.algorithm
         found = recorded.algorithm if recorded.algorithm is not None else 1
-        if found != number:
-            raise OtherAlgorithm(f"{what} algorithm {found}, this is {number}")
+        return None if found == number else f"{what} algorithm {found}, this is {number}"
 
     def _own_inputs(self, recorded: Prediction) -> tuple[Drive, Drive]:
         """What drove a prediction on, the input that it used or the input box; and the input before, if it was used."""

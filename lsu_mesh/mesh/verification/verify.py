@@ -22,7 +22,6 @@ from lsu_mesh.mesh.verification.lineage import Set
 from lsu_mesh.mesh.verification.recompute import (
     FilterRecomputation,
     FusionRecomputation,
-    OtherAlgorithm,
     Recomputation,
     Recomputed,
 )
@@ -87,30 +86,36 @@ def _recomputation(configuration: Configuration, archive: Archive, recorded: Mes
 
 
 def _check(found: Verification, recomputation: Recomputation, recorded: Set) -> Recomputed | None:
-    """Compare one set; what it is by its provenance, or ``None`` where it cannot be recomputed."""
+    """Compare one set; what it is by its provenance, or ``None`` where it cannot be recomputed.
+
+    Equal is a proof, whatever number the arithmetic had. What differs by another arithmetic cannot be recomputed.
+    """
     place = (recorded.src, recorded.topic, recorded.step, recorded.seq)
+    recomputed: Recomputed | None
+    different: tuple[str, Any, Any] | None
     try:
         if isinstance(recorded, Prediction):
             recomputed = recomputation.prediction(recorded)
         else:
             recomputed = recomputation.posterior(recorded)
+        different = next(differences(recorded, recomputed.fields), None)
     except Unverifiable as reason:
         found.unverifiable.append(Missing(*place, str(reason)))
-        if isinstance(reason, OtherAlgorithm):
-            found.outdated[str(reason)] += 1
         return None
     except DoesNotFit as wrong:
-        found.differences.append(Difference(*place, wrong.field, wrong.recorded, wrong.expected))
-        return None
+        recomputed, different = None, (wrong.field, wrong.recorded, wrong.expected)
     except LsuMeshError as error:
-        found.differences.append(Difference(*place, "base", "a set of the model", str(error)))
-        return None
-    different = next(differences(recorded, recomputed.fields), None)
+        recomputed, different = None, ("base", "a set of the model", str(error))
     if different is None:
         found.exact[recorded.src, recorded.topic] += 1
-    else:
+        return recomputed
+    other = recomputation.other_algorithm(recorded)
+    if other is None:
         found.differences.append(Difference(*place, *different))
-    return recomputed
+        return recomputed
+    found.unverifiable.append(Missing(*place, other))
+    found.outdated[other] += 1
+    return None
 
 
 def differences(recorded: Message, fields: Any) -> Iterator[tuple[str, Any, Any]]:
