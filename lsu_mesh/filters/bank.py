@@ -14,7 +14,7 @@ from lsu_mesh.array_types import Flags, Matrix, Stack
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.run_record import FilterRun
-from lsu_mesh.filters.validation import checked_prior, kernel_model, with_offset
+from lsu_mesh.filters.validation import checked_prior, kernel_model, numbers, with_offset
 from lsu_mesh.kernels import batch_run
 from lsu_mesh.kernels.runtime.scratch import scratch
 from lsu_mesh.model import LSUModel
@@ -89,8 +89,9 @@ class FilterBank:
         return self.kind._make_support(self._states[i].copy())
 
     def update(self, Y: ArrayLike) -> Flags:
-        """Data update with Y (N, m), NaN for missing; ``False`` marks an instance whose data contradict its set."""
+        """Data update with Y (N, m), NaN or masked where missing; ``False`` marks an instance whose data contradict its set."""
         outputs = self._table("Y", Y, self._models.C.shape[1])[:, np.newaxis]
+        _check_outputs(outputs)
         outcome = self._sweep(outputs, self._no_inputs(1), True, False)[1]
         return np.equal(outcome[:, 1], batch_run.DONE)
 
@@ -100,6 +101,7 @@ class FilterBank:
         if U is None and p:
             raise ModelError(f"the models have {p} input(s): give U of shape ({len(self)}, {p})")
         inputs = self._no_inputs(1) if U is None else self._table("U", U, p)[:, np.newaxis]
+        _check_finite(inputs)
         outputs = np.zeros((len(self), 1, self._models.C.shape[1]))
         outcome = self._sweep(outputs, inputs, False, True)[1]
         return np.equal(outcome[:, 1], batch_run.DONE)
@@ -107,7 +109,7 @@ class FilterBank:
     def run(
         self, Y: ArrayLike, U: ArrayLike | None = None, *, times: object = None, models: object = None
     ) -> tuple[FilterRun, NDArray[np.int64]]:
-        """All rows of Y (N, T, m) with inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
+        """All rows of Y (N, T, m), NaN or masked where missing, with inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
 
         An instance with fewer rows done than T met a contradiction there; its further rows are NaN. Times of the rows
         and models of one row each are refused: :func:`lsu_mesh.run_filter` takes them.
@@ -117,19 +119,21 @@ class FilterBank:
                 "a bank knows no times and no models of one row; use run_filter with each filter by itself"
             )
         m, p = self._models.C.shape[1], self._model.input_count
-        outputs = np.array(Y, dtype=np.float64)
+        outputs = numbers("Y", Y)
         if outputs.ndim != 3 or outputs.shape[0] != len(self) or outputs.shape[2] != m:
             raise ModelError(f"Y must have shape ({len(self)}, steps, {m}), it has shape {outputs.shape}")
+        _check_outputs(outputs)
         if U is None and p:
             raise ModelError(f"the models have {p} input(s): give U of shape {(*outputs.shape[:2], p)}")
-        inputs = self._no_inputs(outputs.shape[1]) if U is None else np.array(U, dtype=np.float64)
+        inputs = self._no_inputs(outputs.shape[1]) if U is None else numbers("U", U)
         if inputs.shape != (*outputs.shape[:2], p):
             raise ModelError(f"U must have shape {(*outputs.shape[:2], p)}, it has shape {inputs.shape}")
+        _check_finite(inputs[:, :-1])
         record, outcome = self._sweep(outputs, inputs, updating=True, last_prediction=False)
         return FilterRun(*record), outcome[:, 0]
 
     def _table(self, name: str, value: ArrayLike, columns: int) -> Matrix:
-        table = np.array(value, dtype=np.float64)
+        table = numbers(name, value)
         if table.shape != (len(self), columns):
             raise ModelError(f"{name} must have shape ({len(self)}, {columns}), it has shape {table.shape}")
         return table
@@ -153,6 +157,16 @@ class FilterBank:
 
         _in_shares(share, len(self), self._threads)
         return record, outcome
+
+
+def _check_outputs(Y: Stack) -> None:
+    if np.isinf(Y).any():
+        raise ModelError("Y must be finite or NaN (missing)")
+
+
+def _check_finite(inputs: Stack) -> None:
+    if not np.isfinite(inputs).all():
+        raise ModelError("U must hold finite numbers only")
 
 
 def _in_shares(work: Callable[[int, int], None], count: int, threads: int) -> None:

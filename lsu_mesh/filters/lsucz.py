@@ -17,6 +17,7 @@ from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
+from lsu_mesh.kernels.parallelotopes.box import keep_constants
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
 from lsu_mesh.model import LSUModel
@@ -186,6 +187,7 @@ class LSUCZ(Filter):
         finite, body, lower, upper = predict_constrained(
             body, box[0], box[1], arrays.A, arrays.B, center, arrays.G, widths
         )
+        keep_constants(box[0], box[1], arrays.A, arrays.B, center, arrays.G, widths, lower, upper)
         if not finite:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
         held = Held(body, lower, upper, is_hull=False)

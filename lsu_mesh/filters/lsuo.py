@@ -44,6 +44,7 @@ class LSUO(CompiledFilter):
 
     kind: ClassVar[str] = "LSUO"
     guarantee: ClassVar[Guarantee] = "declared"
+    algorithm: ClassVar[int] = 2
     family: ClassVar[int] = filter_step.BOX
 
     def __init__(

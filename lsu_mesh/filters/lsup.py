@@ -68,7 +68,7 @@ class LSUP(CompiledFilter):
 
     kind: ClassVar[str] = "LSUP"
     guarantee: ClassVar[Guarantee] = "declared"
-    algorithm: ClassVar[int] = 2
+    algorithm: ClassVar[int] = 3
     family: ClassVar[int] = filter_step.PARALLELOTOPE
 
     def __init__(

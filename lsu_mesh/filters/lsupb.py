@@ -40,6 +40,7 @@ class LSUPB(CompiledFilter):
 
     kind: ClassVar[str] = "LSUPB"
     guarantee: ClassVar[Guarantee] = "declared"
+    algorithm: ClassVar[int] = 2
     family: ClassVar[int] = filter_step.BUNDLE
 
     def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike]) -> None:

@@ -38,6 +38,7 @@ MEET_BOX = 2
 LOG_2 = math.log(2.0)
 
 _update_box, _predict_box, _predict_parallelotope = box.update, box.predict, parallelotope.predict
+_keep_constants = box.keep_constants
 _output_of_box, _output_of_parallelotope, _volume_of_box = (
     box.predict_output,
     parallelotope.predict_output,
@@ -81,8 +82,6 @@ def advance(
         status = _predict_parallelotope(S[0], S[1 : n + 1], A, B, u, G, widths, time_update, c, T, work)
         low, high = row(work, n, BUNDLE_ROW), row(work, n, BUNDLE_ROW + 1)
         if status == 0 and (boxed or family == BUNDLE):  # the hull of the image is exact: tighter than that of the set
-            if boxed:
-                box.keep_constants(S[n + 1], S[n + 2], A, B, u, G, widths, new[n + 1], new[n + 2])
             status = shrink(new[n + 1], new[n + 2], low, high)
         if status != 0 or (time_update != STRIPS and not boxed):
             return status
@@ -117,7 +116,9 @@ def _advance_box(
 ) -> int:  # fmt: skip
     """:func:`advance` for a box, S (2, n); in a bundle the data strips tighten it one by one."""
     if action == PREDICT:
-        return _predict_box(S[0], S[1], A, B, u, G, widths, new[0], new[1], work)
+        status = _predict_box(S[0], S[1], A, B, u, G, widths, new[0], new[1], work)
+        _keep_constants(S[0], S[1], A, B, u, G, widths, new[0], new[1])
+        return status
     if action == UPDATE and not in_bundle:
         return _update_box(S[0], S[1], P, first, second, option & MEET != 0, option & TIES != 0, new[0], new[1], work)
     copy(S, new)

@@ -174,7 +174,31 @@ def test_one_contradiction_does_not_stop_a_bank() -> None:
     np.testing.assert_array_equal(bank.bounds()[0][2], before)
 
 
+@pytest.mark.parametrize("kind", [LSUO, LSUP, LSUPB])
+def test_a_masked_entry_of_a_bank_is_missing(kind: type[CompiledFilter]) -> None:
+    runs = [simulate(MODEL, 8, seed=seed) for seed in range(3)]
+    Y, U = np.array([run.Y for run in runs]), np.array([run.U for run in runs])
+    mask = np.zeros(Y.shape, dtype=bool)
+    mask[1, 3], mask[2, 5, 0] = True, True
+    masked, missing = np.ma.array(np.where(mask, 99.0, Y), mask=mask), np.where(mask, np.nan, Y)
+    record, done = FilterBank(kind, MODEL, [PRIOR] * 3).run(masked, U)
+    expected, _ = FilterBank(kind, MODEL, [PRIOR] * 3).run(missing, U)
+    assert (done == 8).all()
+    np.testing.assert_array_equal(record.upper, expected.upper)
+    stepped = FilterBank(kind, MODEL, [PRIOR] * 3)
+    assert stepped.update(masked[:, 3]).all()
+    other = FilterBank(kind, MODEL, [PRIOR] * 3)
+    assert other.update(missing[:, 3]).all()
+    np.testing.assert_array_equal(stepped.bounds(), other.bounds())
+
+
 def test_banks_say_what_does_not_fit() -> None:
+    with pytest.raises(ModelError, match="U must hold finite numbers only"):
+        FilterBank(LSUO, MODEL, [PRIOR] * 2).run(np.zeros((2, 3, 2)), np.full((2, 3, 1), np.nan))
+    with pytest.raises(ModelError, match="U must hold finite numbers only"):
+        FilterBank(LSUO, MODEL, [PRIOR] * 2).predict(np.full((2, 1), np.inf))
+    with pytest.raises(ModelError, match=r"Y must be finite or NaN \(missing\)"):
+        FilterBank(LSUO, MODEL, [PRIOR] * 2).update(np.full((2, 2), np.inf))
     with pytest.raises(ModelError, match="3 models and 2 priors"):
         FilterBank(LSUO, [MODEL] * 3, [PRIOR] * 2)
     with pytest.raises(ModelError, match="3 coordinates, one per state, it has 2"):

@@ -16,7 +16,8 @@ OPTIONS: dict[str, tuple[dict[str, Any], ...]] = {
     "ZonotopicKalman": ({}, {"form": "predictor"}, {"order": 4}),
     "LSUCZ": ({}, {"max_generators": 6, "max_constraints": 2}),
 }
-CASES = [(kind, options) for kind in filter_kinds() for options in OPTIONS.get(kind, ({},))]
+CASES = [(kind, options) for kind in filter_kinds() if kind != "WindowMAP" for options in OPTIONS.get(kind, ({},))]
+"""WindowMAP promises no sets, and its objective ``Σ rho + Σ r`` adds numbers of different units."""
 NAMES = [f"{kind} {' '.join(map(str, options.values()))}".strip() for kind, options in CASES]
 BATTERY = LSUModel([[1.0, -0.1], [0.0, 1.0]], [[0.1], [0.0]], [[1.0, 0.0]], [0.05, 0.0], 0.3)
 """A charge, counted by a current whose bias is constant."""
@@ -30,6 +31,7 @@ def in_units(model: LSUModel, d: np.ndarray) -> LSUModel:
         np.array(model.C) / d,
         model.rho * d,
         model.r,
+        domain=None if model.domain is None else Orthotope(d * model.domain.lower, d * model.domain.upper),
     )
 
 
@@ -41,6 +43,8 @@ def test_widths_do_not_depend_on_the_units_of_the_states(
 ) -> None:
     plain = systems.get(name)
     n = plain.state_count
+    if kind == "TruncatedKalman":
+        plain = plain.replace(domain=Orthotope([-1.0] * n, [1.0] * n))
     data = simulate(plain, 40, seed=seed)
     d = 10.0 ** np.random.default_rng(seed).uniform(-4.0, 4.0, n)
     make: Any = filter_class(kind)
