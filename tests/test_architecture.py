@@ -54,7 +54,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("intersection",),
     ],
     "lsu_mesh.filters": [
-        ("filter", "validation", "inconsistency", "transfer_gain", "plain_outputs"),
+        ("filter", "validation", "inconsistency", "last_met", "transfer_gain", "plain_outputs"),
         ("compiled", "constrained_intersection", "window"),
         (REST,),
         ("registry", "run"),

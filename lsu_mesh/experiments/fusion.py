@@ -99,13 +99,13 @@ def tally(kind: str, feedback: str, seeds: range, steps: int) -> Tally:
         for k in range(steps):
             for i, local in enumerate(filters):
                 if carried is not None:
-                    local.condition(carried)
+                    local.condition(carried, gain=None)
                 local.update(made.Y[k, i : i + 1])
             central.update(made.Y[k])
             together = fuse_filters(filters)
             if feedback == "same step":
                 for local in filters:
-                    local.condition(Orthotope(*together.bounds))
+                    local.condition(Orthotope(*together.bounds), gain=None)
             _count(counts, k, made.X[k], filters=filters, together=together, central=central)
             if feedback == "next step":
                 carried = _carried(base, together, made.U[k])

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from functools import partial
-from typing import ClassVar, Literal, cast, get_args
+from typing import ClassVar, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +14,7 @@ from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, GainOf, OutputPrediction
 from lsu_mesh.filters.inconsistency import known_to_last_bits, strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
-from lsu_mesh.filters.transfer_gain import measured
+from lsu_mesh.filters.transfer_gain import MAX_SWEEPS, SETTLED, conditioned
 from lsu_mesh.filters.validation import (
     KernelModel,
     checked_prior,
@@ -42,15 +41,25 @@ def ties_option(ties: Ties) -> int:
     return filter_step.TIES if ties == "new" else 0
 
 
+class Held(NamedTuple):
+    """A state, and the set that was met last where the state is what came of it."""
+
+    state: Matrix
+    met: Support | None
+
+
 class CompiledFilter(Filter):
     """A filter whose steps are those of ``kernels/filter_step.py`` for its ``family`` and ``option``.
 
-    The state is a matrix with rows of length n. It is never written again once it is in force, so that a snapshot is
+    The state is a matrix with rows of length n. It is never written again once it is in force, so that a snapshot holds
     the matrix itself.
     """
 
     family: ClassVar[int]
+    conditioning: ClassVar[int] = 2
     option: int
+    _met: Held | None = None
+    """The set that was met last, and the state that came of it."""
 
     def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], option: int) -> None:
         self.option = option
@@ -139,22 +148,48 @@ class CompiledFilter(Filter):
         self._accept(state, status)
         return self.support
 
-    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+    def condition(self, support: Support, gain: GainOf | None = "support") -> float:
         """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
-        return measured(self, gain, partial(self._condition, support))
+        return conditioned(self, support, gain, self._condition)
 
     def _condition(self, support: Support) -> float:
+        """Meet the box of ``support`` and its faces, again until that gains no more."""
         if support.dim != self._model.state_count:
             raise ModelError(f"the set must have {self._model.state_count} coordinates, it has {support.dim}")
-        before = self._log_volume(self._state)
-        state, status = self._meet_box(self._state, support.interval_hull())
-        for P, y, r in faces(support):
+        hull, strips = support.interval_hull(), faces(support)
+        before = size = self._log_volume(self._state)
+        state = self._state
+        for sweep in range(MAX_SWEEPS):
+            swept = self._swept(state, hull, strips)
+            left = self._log_volume(swept)
+            does_gain = size - left >= SETTLED  # of flat sets it is not known
+            if does_gain or sweep == 0:
+                state, size = swept, left
+            if not does_gain:
+                break
+        self._state = state
+        return max(0.0, before - size) if before > -math.inf else 0.0
+
+    def _swept(self, state: Matrix, hull: Orthotope, strips: list[tuple[Matrix, Vector, Vector]]) -> Matrix:
+        """The part of a state in a box and in strips, one after the other."""
+        state, status = self._meet_box(state, hull)
+        for P, y, r in strips:
             if status == 0:
                 state, status = self._cut(state, P, y, r)
         if status > 0:
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
-        self._accept(state, status)
-        return max(0.0, before - self._log_volume(state)) if before > -math.inf else 0.0
+        self._check_size(status)
+        return state
+
+    @property
+    def last_met(self) -> Support | None:
+        """The set that was met last, where the state is still what came of it, bit by bit."""
+        met = self._met
+        return met.met if met is not None and met.state.tobytes() == self._state.tobytes() else None
+
+    @last_met.setter
+    def last_met(self, support: Support) -> None:
+        self._met = Held(self._state, support)
 
     def reset(self, support: Support) -> None:
         self._state = self._start(checked_prior(self._model, support))
@@ -165,10 +200,11 @@ class CompiledFilter(Filter):
         return True
 
     def snapshot(self) -> object:
-        return self._state
+        return Held(self._state, self.last_met)
 
     def restore(self, snapshot: object) -> None:
-        self._state = cast("Matrix", snapshot)
+        held = cast("Held", snapshot)
+        self._state, self._met = held.state, None if held.met is None else held
 
     @property
     def has_compiled_loop(self) -> bool:
@@ -244,9 +280,12 @@ class CompiledFilter(Filter):
         return interval.lower, interval.upper
 
     def _accept(self, state: Matrix, status: int) -> None:
+        self._check_size(status)
+        self._state = state
+
+    def _check_size(self, status: int) -> None:
         if status < 0:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
-        self._state = state
 
     def _contradiction(self, model: LSUModel, C: Matrix, y: Vector, r: Vector, status: int) -> InconsistentData:
         """Names the strips up to the one that proved the contradiction."""

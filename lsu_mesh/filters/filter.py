@@ -35,9 +35,13 @@ class Filter(ABC):
     """
 
     kind: ClassVar[str]
+    """Name in errors; a class that states none is called by its class name."""
     algorithm: ClassVar[int] = 1
     """Number of the arithmetic of this kind, raised whenever the bits of its sets change; published with each set."""
-    """Name in errors; a class that states none is called by its class name."""
+    conditioning: ClassVar[int] = 1
+    """Number of the arithmetic of :meth:`condition` alone; what a filter with transfers publishes rises with it."""
+    skips_met: bool = True
+    """Whether a set that holds the one met last is left out; a fusion, whose sources may be equal, goes through all."""
     guarantee: ClassVar[Guarantee]
     """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates.
 
@@ -116,14 +120,26 @@ class Filter(ABC):
         """
 
     @abstractmethod
-    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+    def condition(self, support: Support, gain: GainOf | None = "support") -> float:
         """Bayesian transfer: keep ``self ∩ support`` (or a set of this class that holds it).
 
         Returns the gain ``ln vol(before) − ln vol(after)`` in nats, never negative: with ``gain="support"`` of the
-        supports up to three states, else of the hulls; with ``"hull"`` of the interval hulls; by default of what the
-        class measures at no cost. ``InconsistentData`` on a proved
-        empty intersection; the filter then keeps the state that it had.
+        supports up to three states, above and for flat sets of the interval hulls, by their sides that have a width;
+        with ``"hull"`` of the hulls; with ``None`` of what the class measures at no cost.
+
+        The same set again changes nothing, bit by bit, until data, a time update or another set have come in between.
+        ``InconsistentData`` on a proved empty intersection; the filter then keeps the state that it had.
         """
+
+    @property
+    def last_met(self) -> Support | None:
+        """The set that was met last, where nothing has changed the own one since; part of :meth:`snapshot`."""
+        return None
+
+    @last_met.setter
+    def last_met(self, support: Support) -> None:
+        """A class that remembers none goes through each set again."""
+        del support
 
     @abstractmethod
     def reset(self, support: Support) -> None:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import ClassVar, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
-from lsu_mesh.errors import InconsistentData, ModelError
+from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
+from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
-from lsu_mesh.filters.transfer_gain import hull_gain, measured
+from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
+from lsu_mesh.kernels.zonotopes.time_update import image_of_box
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
+
+Box = tuple[Vector, Vector]
 
 
 class Gaussian(NamedTuple):
@@ -47,12 +50,18 @@ class Kalman(Filter):
     ModelError
         Names the option or the prior that is wrong.
 
+    Transferred sets are kept beside the density, as a box that interval arithmetic carries on; what is published is
+    truncated at it. The density takes nothing from them: the same set twice is no second measurement.
+
     Source: Kalman 1960, in Joseph's form.
     """
 
     kind: ClassVar[str] = "Kalman"
     guarantee: ClassVar[Guarantee] = "none"
+    conditioning: ClassVar[int] = 2
     _held: Gaussian
+    _box: Box | None
+    """What was transferred, carried on; ``None``: nothing was."""
 
     def __init__(
         self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], sigmas: float = 3.0
@@ -76,8 +85,8 @@ class Kalman(Filter):
 
     @property
     def point(self) -> Vector:
-        """Mean (n,)."""
-        return np.array(self._held.mean)
+        """Mean (n,), moved into what was transferred."""
+        return _within(self._held.mean, self._box)
 
     @property
     def covariance(self) -> Matrix:
@@ -85,20 +94,24 @@ class Kalman(Filter):
         return np.array(self._held.covariance)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """``x̂ ± sigmas · √diag P``, (n,), (n,); *not* guaranteed."""
+        """``x̂ ± sigmas · √diag P``, truncated at what was transferred, (n,), (n,); *not* guaranteed."""
         mean, covariance = self._held
         reach = self._sigmas * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return mean - reach, mean + reach
+        return _within(mean - reach, self._box), _within(mean + reach, self._box)
 
     def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
-        """``C x̂ ± sigmas · √diag(C P C' + R)``; *not* guaranteed."""
+        """``C x̂ ± sigmas · √diag(C P C' + R)``, truncated at what was transferred; *not* guaranteed."""
         mean, covariance = self._held
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
         C = arrays.C
         variance = np.einsum("ij,jk,ik->i", C, covariance, C) + uniform_variance(arrays.r)
         reach = self._sigmas * np.sqrt(np.maximum(variance, 0.0))
-        return shifted(OutputPrediction(C @ mean - reach, C @ mean + reach, C @ mean), used, u)
+        band = [C @ mean - reach, C @ mean + reach, C @ mean]
+        if self._box is not None:
+            low, high = image_of_box(C, *self._box)
+            band = [np.clip(side, low - arrays.r, high + arrays.r) for side in band]
+        return shifted(OutputPrediction(*band), used, u)
 
     def update(
         self,
@@ -126,44 +139,58 @@ class Kalman(Filter):
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
         center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
+        if self._box is not None:
+            self._box = self._carried(self._box, u, rho, model)
         mean, P = self._held
         noise = (arrays.G * uniform_variance(widths)) @ arrays.G.T
         self._held = Gaussian(arrays.A @ mean + arrays.B @ center, arrays.A @ P @ arrays.A.T + noise)
         return self.support
 
+    def _carried(
+        self, box: Box, u: ArrayLike | Orthotope | None, rho: ArrayLike | None, model: LSUModel | None
+    ) -> Box | None:
+        """The box one step later; ``None`` where it leaves the domain or all numbers: it says nothing any more."""
+        later = LSUO(self._model, Orthotope(*box))
+        try:
+            later.predict(u, rho, model)
+        except (InconsistentData, UnboundedSupport):
+            return None
+        return later.bounds()
+
     def _mean_output(self, C: Matrix) -> tuple[Vector, Vector]:
         """``C x̂`` as an interval of no width: of a periodic output the multiple nearest to it is taken."""
         return C @ self._held.mean, C @ self._held.mean
 
-    def condition(self, support: Support, gain: GainOf | None = None) -> float:
-        """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
-        return measured(self, gain, partial(self._condition, support))
+    def condition(self, support: Support, gain: GainOf | None = "support") -> float:
+        """Bayesian transfer: keep the box of ``support`` beside the density; see :class:`Filter`."""
+        return conditioned(self, support, gain, self._condition)
 
     def _condition(self, support: Support) -> float:
-        """Take the box of ``support`` as a measurement of all states with uniform noise; the gain is of the boxes.
+        """Meet the box beside the density with that of ``support``; the gain is that of the published boxes.
 
-        Raises ``InconsistentData`` where the boxes have no point in common.
+        Raises ``InconsistentData`` where the published box and that of ``support`` have no point in common.
         """
         lower, upper = checked_prior(self._model, support).bounds()
         before = self.bounds()
         if (np.maximum(lower, before[0]) > np.minimum(upper, before[1])).any():
             raise InconsistentData(f"the box of {self.kind} and the transferred set have no point in common")
-        middle, reach = 0.5 * (lower + upper), 0.5 * (upper - lower)
-        self._held = corrected(self._held, np.eye(len(middle)), middle, uniform_variance(reach))
+        own = self._box
+        self._box = (lower, upper) if own is None else (np.maximum(own[0], lower), np.minimum(own[1], upper))
         return hull_gain(before, self.bounds())
 
     def reset(self, support: Support) -> None:
         """Start again with mean and variance of the uniform distribution on the box of ``support``."""
         lower, upper = checked_prior(self._model, support).bounds()
         self._held = Gaussian(0.5 * (lower + upper), np.diag(uniform_variance(0.5 * (upper - lower))))
+        self._box = None
 
     def snapshot(self) -> object:
-        """Mean and covariance."""
-        return self._held
+        """Mean, covariance and what was transferred."""
+        return self._held, self._box
 
     def restore(self, snapshot: object) -> None:
         """Return to a state taken by :meth:`snapshot`, bit by bit."""
-        self._held = cast("Gaussian", snapshot)
+        self._held, self._box = cast("tuple[Gaussian, Box | None]", snapshot)
 
 
 def corrected(held: Gaussian, C: Matrix, y: Vector, variances: Vector) -> Gaussian:
@@ -179,3 +206,8 @@ def corrected(held: Gaussian, C: Matrix, y: Vector, variances: Vector) -> Gaussi
         left = np.eye(len(mean)) - np.outer(K, row)
         P = left @ P @ left.T + variance * np.outer(K, K)
     return Gaussian(mean, 0.5 * (P + P.T))
+
+
+def _within(x: Vector, box: Box | None) -> Vector:
+    """x (n,) moved into a box."""
+    return np.array(x) if box is None else np.clip(x, *box)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from functools import partial
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from lsu_mesh.filters.constrained_intersection import joined
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
-from lsu_mesh.filters.transfer_gain import hull_gain, measured
+from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.parallelotopes.box import keep_constants
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
@@ -45,6 +44,8 @@ class Held(NamedTuple):
     upper: Vector
     is_hull: bool
     """Whether the box is the meet with the interval hull of the set already."""
+    met: Support | None = None
+    """The set that was met last, where nothing has come since."""
 
 
 class LSUCZ(Filter):
@@ -77,6 +78,7 @@ class LSUCZ(Filter):
     kind: ClassVar[str] = "LSUCZ"
     algorithm: ClassVar[int] = 3
     guarantee: ClassVar[Guarantee] = "declared"
+    conditioning: ClassVar[int] = 2
     _held: Held
     _support: ConstrainedZonotope | None
     _bounds: tuple[Vector, Vector] | None
@@ -182,7 +184,7 @@ class LSUCZ(Filter):
         center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
         body, (lower, upper) = self._held.body, self.bounds()
         if not self._limits.allow(body):
-            body, lower, upper, _ = self._settled(body, lower, upper)
+            body, lower, upper = self._settled(body, lower, upper)[:3]
         box = np.array([lower, upper])  # one compiled kernel serves, whether or not the bounds may be written
         finite, body, lower, upper = predict_constrained(
             body, box[0], box[1], arrays.A, arrays.B, center, arrays.G, widths
@@ -194,9 +196,18 @@ class LSUCZ(Filter):
         self._hold(held if used.domain is None else _within(held, used.domain))
         return self.support
 
-    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+    def condition(self, support: Support, gain: GainOf | None = "support") -> float:
         """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
-        return measured(self, gain, partial(self._condition, support))
+        return conditioned(self, support, gain, self._condition)
+
+    @property
+    def last_met(self) -> Support | None:
+        """The set that was met last, where nothing has come since."""
+        return self._held.met
+
+    @last_met.setter
+    def last_met(self, support: Support) -> None:
+        self._held = self._held._replace(met=support)
 
     def _condition(self, support: Support) -> float:
         """Keep ``X ∩ support``; the gain, in nats, is that of the interval hulls.

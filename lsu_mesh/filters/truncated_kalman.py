@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import ModelError
-from lsu_mesh.filters.kalman import Gaussian, Kalman
+from lsu_mesh.filters.kalman import Box, Gaussian, Kalman
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -58,8 +58,9 @@ class TruncatedKalman(Kalman):
     @property
     def point(self) -> Vector:
         """Mean (n,) of the truncated density; a later coordinate's truncation may move an earlier one, so it is met
-        with the domain once more."""
-        return np.clip(self._held.mean, self._lower, self._upper)
+        with the domain once more, and with what was transferred."""
+        inside = np.clip(self._held.mean, self._lower, self._upper)
+        return inside if self._box is None else np.clip(inside, *self._box)
 
     def update(
         self,
@@ -93,16 +94,11 @@ class TruncatedKalman(Kalman):
         super().reset(support)
         self._full = self._held
 
-    def _condition(self, support: Support) -> float:
-        gain = super()._condition(support)
-        self._full = self._held
-        return gain
-
     def snapshot(self) -> object:
-        return self._held, self._full
+        return self._held, self._full, self._box
 
     def restore(self, snapshot: object) -> None:
-        self._held, self._full = cast("tuple[Gaussian, Gaussian]", snapshot)
+        self._held, self._full, self._box = cast("tuple[Gaussian, Gaussian, Box | None]", snapshot)
 
 
 def truncated(held: Gaussian, lower: Vector, upper: Vector) -> Gaussian:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
-from lsu_mesh.filters.transfer_gain import hull_gain, measured
+from lsu_mesh.filters.transfer_gain import MAX_SWEEPS, SETTLED, conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.parallelotopes.box import keep_constants
 from lsu_mesh.kernels.parallelotopes.bundle import tighten_all
@@ -47,6 +46,8 @@ class Held(NamedTuple):
     lower: Vector
     upper: Vector
     pending: Strips
+    met: Support | None = None
+    """The set that was met last, where nothing has been brought to the zonotope since."""
 
 
 class ZonotopicKalman(Filter):
@@ -86,6 +87,7 @@ class ZonotopicKalman(Filter):
     kind: ClassVar[str] = "ZonotopicKalman"
     guarantee: ClassVar[Guarantee] = "declared"
     algorithm: ClassVar[int] = 2
+    conditioning: ClassVar[int] = 2
     _held: Held
 
     def __init__(
@@ -199,15 +201,25 @@ class ZonotopicKalman(Filter):
         self._held = held
         return self.support
 
-    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+    def condition(self, support: Support, gain: GainOf | None = "support") -> float:
         """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
-        return measured(self, gain, partial(self._condition, support))
+        return conditioned(self, support, gain, self._condition)
+
+    @property
+    def last_met(self) -> Support | None:
+        """The set that was met last, where nothing has been brought to the zonotope since."""
+        return self._held.met
+
+    @last_met.setter
+    def last_met(self, support: Support) -> None:
+        self._held = self._held._replace(met=support)
 
     def _condition(self, support: Support) -> float:
         """Keep a zonotope that holds ``X ∩ support``, and the box of ``support``; the gain is that of the hulls.
 
-        The faces of the box are offered as strips to the gain; the result is kept where it shrinks the hull, else the
-        set stays as it is. :meth:`bounds` never widen: they stay met with what they were, and with the box.
+        The faces of the box are offered as strips to the gain, again until that gains no more; the result is kept where
+        it shrinks the hull, else the set stays as it is. :meth:`bounds` never widen: they stay met with what they were,
+        and with the box.
         """
         other = checked_prior(self._model, support)
         before = self.bounds()
@@ -219,10 +231,7 @@ class ZonotopicKalman(Filter):
         met = self._held._replace(lower=np.maximum(before[0], lower), upper=np.minimum(before[1], upper))
         if _is_contradictory(met):
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
-        shrunk = _corrected(met._replace(pending=_no_strips(box.dim)), strips)._replace(pending=met.pending)
-        if self._order is not None:
-            shrunk = shrunk._replace(H=box_shortest(shrunk.H, self._order, self._scaled))
-        self._held = shrunk if _size(shrunk) < _size(met) else met
+        self._held = self._shrunk(met, strips)
         return hull_gain(before, self.bounds())
 
     def reset(self, support: Support) -> None:
@@ -276,6 +285,21 @@ class ZonotopicKalman(Filter):
             raise InconsistentData("the data are proved to contradict the set")
         return new
 
+    def _shrunk(self, held: Held, strips: Strips) -> Held:
+        """The zonotope corrected by strips for as long as its hull shrinks; data that wait go on waiting."""
+        for sweep in range(MAX_SWEEPS):
+            shrunk = _corrected(held._replace(pending=_no_strips(held.c.size)), strips)._replace(pending=held.pending)
+            if self._order is not None:
+                shrunk = shrunk._replace(H=box_shortest(shrunk.H, self._order, self._scaled))
+            if not _size(shrunk) < _size(held):
+                break
+            does_gain = hull_gain(_hull(held), _hull(shrunk)) >= SETTLED
+            if does_gain or sweep == 0:
+                held = shrunk
+            if not does_gain:
+                break
+        return held
+
     def _image(self, C: Matrix) -> tuple[Vector, Vector]:
         """Bounds of ``C x``."""
         box_low, box_high = image_of_box(C, *self.bounds())
@@ -298,12 +322,17 @@ def _corrected(held: Held, strips: Strips) -> Held:
     K = kalman_gain(held.H, strips.C, strips.r)
     c, H, slack = corrected(held.c, held.H, strips.C, strips.y, strips.r, K)
     H, _ = absorb_box(H, np.zeros((0, H.shape[1])), slack)
-    return held._replace(c=c, H=H, pending=_no_strips(c.size))
+    return held._replace(c=c, H=H, pending=_no_strips(c.size), met=None)
+
+
+def _hull(held: Held) -> tuple[Vector, Vector]:
+    """The hull of the zonotope alone."""
+    return Zonotope(held.c, held.H).bounds()
 
 
 def _bounds(held: Held) -> tuple[Vector, Vector]:
     """The hull of the zonotope, met with the box."""
-    lower, upper = Zonotope(held.c, held.H).bounds()
+    lower, upper = _hull(held)
     return np.maximum(lower, held.lower), np.minimum(upper, held.upper)
 
 
@@ -314,7 +343,7 @@ def _is_contradictory(held: Held) -> bool:
 
 def _size(held: Held) -> float:
     """Sum of the half-widths of the hull relative to the box, a scale-free measure of what a correction has gained."""
-    lower, upper = Zonotope(held.c, held.H).bounds()
+    lower, upper = _hull(held)
     widths = np.where(held.upper > held.lower, held.upper - held.lower, 1.0)
     return float(((upper - lower) / widths).sum())
 

@@ -13,6 +13,10 @@ from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.testing.filter_state import Witness
 
 DOMAIN = 100.0
+COPIES = 5
+"""How often the same set is transferred again."""
+SHARE = 0.7
+"""Of the width of the filter's bounds, above the lower ones, that is transferred to it."""
 
 
 def check_estimates(make: Callable[[LSUModel, Orthotope], Filter], seeds: Iterable[int], steps: int) -> None:
@@ -44,10 +48,18 @@ def _check_step(filter: Filter, witness: Witness, y: np.ndarray, u: np.ndarray |
     witness.check_shapes(filter.support)
     witness.check_volume()
     witness.action = "condition"
-    gain = filter.condition(filter.support.interval_hull())
+    other = _part_of(filter)
+    gain = filter.condition(other)
     witness.expect(gain >= 0.0, f"the gain {gain}", "a number of nats, not negative")
     witness.check_shapes(filter.support)
+    witness.check_copies(lambda: filter.condition(other), COPIES, lambda: filter.predict(u))
     witness.action = "predict"
     witness.check_snapshot(lambda: filter.predict(u))
     filter.predict(u)
     witness.check_shapes(filter.support)
+
+
+def _part_of(filter: Filter) -> Orthotope:
+    """A box that cuts each side of the filter's bounds."""
+    lower, upper = filter.bounds()
+    return Orthotope(lower, lower + SHARE * (upper - lower))

@@ -24,8 +24,8 @@ Make = Callable[[LSUModel, Orthotope], Filter]
 
 SEEDS = 57
 """Problems by default: three of each kind."""
-TRANSFERS = 3
-"""How often the same set is transferred: a copy says nothing new, so no common point may be lost by it."""
+COPIES = 5
+"""How often the same set is transferred again: a copy says nothing new, so no bit may change by it."""
 MAX_ENUMERATED = 3
 """States up to which common points beside the true state are looked for: vertices in more dimensions take long."""
 DIRECTIONS = 3
@@ -115,32 +115,36 @@ class _Run:
                 lambda one: one.predict(moment.u, moment.rho, moment.model),
             )
         if with_transfer:
-            self._condition(moment.x)
+            self._condition(moment)
 
     def _predict(self, moment: Moment, x: Exact) -> None:
         self._witness.action = "predict"
         self._filter.predict(moment.u, moment.rho, moment.model)
         self._holds(x)
 
-    def _condition(self, x: Exact) -> None:
-        """Transfers of one set that holds the truth: no common point is lost, nothing widens, copies do no harm."""
-        before = self._filter.bounds()
+    def _condition(self, moment: Moment) -> None:
+        """A transfer of a set that holds the truth: no common point is lost, nothing widens, copies change nothing."""
+        x, before = moment.x, self._filter.bounds()
         shape = str(self._rng.choice(SHAPES))
         own = self._filter.support
         other = around(x, shape, before[1] - before[0], own=own, rng=self._rng)
         if other is None:
             return
         points = common_points(x, own, before, other=other, rng=self._rng) if len(x) <= MAX_ENUMERATED else []
-        for count in range(1, TRANSFERS + 1):
-            self._witness.action = f"condition on a {shape}, time {count}"
-            self._transfer(other, x)
-            lower, upper = self._filter.bounds()
-            for point in points:
-                if not inside_box(lower, upper, point) or is_outside(self._filter.support, point):
-                    raise self._witness.failure(
-                        f"a set without {_shown(point)}, which lies in the set before and in the transferred one",
-                        "a set that holds all of both",
-                    )
+        self._witness.action = f"condition on a {shape}"
+        self._transfer(other, x)
+        lower, upper = self._filter.bounds()
+        for point in points:
+            if not inside_box(lower, upper, point) or is_outside(self._filter.support, point):
+                raise self._witness.failure(
+                    f"a set without {_shown(point)}, which lies in the set before and in the transferred one",
+                    "a set that holds all of both",
+                )
+        self._witness.check_copies(
+            lambda: self._filter.condition(other),
+            COPIES,
+            lambda: self._filter.predict(moment.u, moment.rho, moment.model),
+        )
 
     def _transfer(self, other: Support, x: Exact) -> None:
         lower, upper = (side.copy() for side in self._filter.bounds())

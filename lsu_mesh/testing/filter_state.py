@@ -140,6 +140,17 @@ class Witness:
             self.check_same(after, "restore(snapshot()) and the same step again")
         self._filter.restore(held)
 
+    def check_copies(self, transfer: Callable[[], object], count: int, predict: Callable[[], object]) -> None:
+        """The set that was just transferred changes nothing when it comes again, also after a snapshot is restored."""
+        before, held = state_of(self._filter), self._filter.snapshot()
+        for number in range(count):
+            transfer()
+            self.check_same(before, f"the same set transferred {number + 2} times in a row")
+        predict()
+        self._filter.restore(held)
+        transfer()
+        self.check_same(before, "restore(snapshot()) and the same set transferred once more")
+
     def check_resumption(self, other: Filter, act: Callable[[Filter], object]) -> None:
         """A filter that says so goes on from the published set as this one does, bit by bit."""
         if not self._filter.is_resumable:

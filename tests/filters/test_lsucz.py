@@ -222,7 +222,7 @@ def test_a_noise_map_spans_its_columns_only() -> None:
 def test_conditioning_keeps_common_points_and_gains(other: Orthotope) -> None:
     estimator = LSUCZ(MODEL, PRIOR, 12, 4)
     lower, upper = estimator.bounds()
-    gain = estimator.condition(other)
+    gain = estimator.condition(other, "hull")
     after = estimator.bounds()
     assert gain > 0
     assert gain == pytest.approx(np.log(upper - lower).sum() - np.log(after[1] - after[0]).sum(), abs=1e-9)

@@ -132,7 +132,7 @@ def test_conditioning_keeps_common_points(other: Orthotope) -> None:
     estimator.update([0.0, 0.1])
     before = estimator.support
     lower, upper = estimator.bounds()
-    assert estimator.condition(other) > 0
+    assert estimator.condition(other, "hull") > 0
     after = estimator.bounds()
     assert (after[0] >= np.maximum(lower, other.bounds()[0])).all()
     assert (after[1] <= np.minimum(upper, other.bounds()[1])).all()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import ClassVar, Literal, cast
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Counts, Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
-from lsu_mesh.filters.transfer_gain import hull_gain, measured
+from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, input_interval, output_vector, same_states
 from lsu_mesh.filters.window.interval_estimate import interval_estimate
 from lsu_mesh.filters.window.program import HalfWidths, Selected, WindowData, WindowProgram, WindowSolution
@@ -317,9 +316,9 @@ class WindowMAP(Filter):
             counts=state.counts[1:],
         )
 
-    def condition(self, support: Support, gain: GainOf | None = None) -> float:
+    def condition(self, support: Support, gain: GainOf | None = "support") -> float:
         """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
-        return measured(self, gain, partial(self._condition, support))
+        return conditioned(self, support, gain, self._condition)
 
     def _condition(self, support: Support) -> float:
         """Meet the box of the newest state with that of ``support``; the gain is that of the published intervals.

@@ -68,13 +68,15 @@ class FusionOutcome:
 
 
 def fusion_engine(configuration: Configuration, settings: FusionSettings) -> Filter:
-    """What holds the set of a fusion: a constrained zonotope of limited complexity."""
-    return LSUCZ(
+    """What holds the set of a fusion: a constrained zonotope of limited complexity, met with every source in turn."""
+    engine = LSUCZ(
         configuration.base_model,
         configuration.prior,
         max_generators=settings.max_generators,
         max_constraints=settings.max_constraints,
     )
+    engine.skips_met = False
+    return engine
 
 
 def fusion_algorithm(policy: Policy) -> int:
@@ -137,7 +139,7 @@ class _Meeting:
             return False
         before = self._engine.snapshot()
         try:
-            self._engine.condition(support)
+            self._engine.condition(support, gain=None)
         except InconsistentData:
             return False
         own_lower, own_upper = self._engine.bounds()
