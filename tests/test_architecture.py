@@ -55,7 +55,8 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh.filters": [
         ("filter", "validation", "inconsistency", "last_met", "transfer_gain", "plain_outputs"),
-        ("compiled", "constrained_intersection", "window"),
+        ("lagged_states",),
+        ("compiled", "constrained_intersection", "constrained_state", "window"),
         (REST,),
         ("registry", "run"),
         ("bank", "warm_up"),

@@ -89,7 +89,7 @@ class FilterBank:
         return self.kind._make_support(self._states[i].copy())
 
     def update(self, Y: ArrayLike) -> Flags:
-        """Data update with Y (N, m), NaN or masked where missing; ``False`` marks an instance whose data contradict its set."""
+        """Data update with Y (N, m), NaN or masked: missing; ``False``: the data contradict that instance's set."""
         outputs = self._table("Y", Y, self._models.C.shape[1])[:, np.newaxis]
         _check_outputs(outputs)
         outcome = self._sweep(outputs, self._no_inputs(1), True, False)[1]
@@ -109,8 +109,9 @@ class FilterBank:
     def run(
         self, Y: ArrayLike, U: ArrayLike | None = None, *, times: object = None, models: object = None
     ) -> tuple[FilterRun, NDArray[np.int64]]:
-        """All rows of Y (N, T, m), NaN or masked where missing, with inputs U (N, T, p): the record, with a leading axis N, and the rows done (N,).
+        """All rows of Y (N, T, m), NaN or masked where missing, with inputs U (N, T, p).
 
+        Returns the record, with a leading axis N, and the rows done (N,).
         An instance with fewer rows done than T met a contradiction there; its further rows are NaN. Times of the rows
         and models of one row each are refused: :func:`lsu_mesh.run_filter` takes them.
         """

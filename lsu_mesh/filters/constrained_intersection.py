@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.filters.lagged_states import rows_of
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_sets, meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box
 from lsu_mesh.supports.arrays import are_finite
@@ -28,9 +29,9 @@ def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_gener
     ----------
     body, bounds:
         X, and a box (lower, upper), (n,) each, that holds all of it that matters: strips that hold the box are left
-        out, which is exact for ``X ∩ box``.
+        out, which is exact for ``X ∩ box``. X may have more rows than n, of other states: ``other`` tells of the first.
     other:
-        Any set of the same dimension.
+        Any set of dimension n.
     most_generators:
         A constrained zonotope with more generators than that is taken by its box; ``None`` is no limit.
     """
@@ -42,7 +43,8 @@ def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_gener
     if strips is not None:
         P, y, r = strips
         cuts = _cuts(bounds, other, P, y=y, r=r)
-        return _finite((body[0], *meet_strips(*body, P, np.where(cuts, y, np.nan), r)), body) if cuts.any() else body
+        rows = rows_of(P, 0, body[0].size // other.dim)
+        return _finite((body[0], *meet_strips(*body, rows, np.where(cuts, y, np.nan), r)), body) if cuts.any() else body
     met = other.to_constrained_zonotope()
     if most_generators is not None and met.generator_count > most_generators:
         return joined(body, bounds, other.interval_hull(), most_generators)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import functools
-from typing import ClassVar, Literal, NamedTuple
+from functools import partial
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
+from lsu_mesh.filters.constrained_state import Held, log_size, within
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
+from lsu_mesh.filters.lagged_states import body_of, rows_of, stacked_step, with_newest
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
@@ -36,18 +38,6 @@ MAX_EXACT_VOLUME = 3
 """Dimension up to which :meth:`LSUCZ.volume` enumerates vertices; ``support.volume()`` does so up to 6."""
 
 
-class Held(NamedTuple):
-    """What the filter knows: the state lies in the set with arrays ``body`` = (c, G, A, b) and in [lower, upper]."""
-
-    body: Body
-    lower: Vector
-    upper: Vector
-    is_hull: bool
-    """Whether the box is the meet with the interval hull of the set already."""
-    met: Support | None = None
-    """The set that was met last, where nothing has come since."""
-
-
 class LSUCZ(Filter):
     """``X_{k|k} = X_{k|k−1} ∩ {|y − C x| ≤ r}``,  ``X_{k+1|k} = A X_{k|k} ⊕ B u ⊕ N box(rho)`` (P2023 (15), (16)).
 
@@ -64,6 +54,9 @@ class LSUCZ(Filter):
         the centre of its generators' box (Method 2).
     reduce:
         ``False``: no limit of either kind, the set grows with every step.
+    lag:
+        L: the sets of x_{k−1}, …, x_{k−L} given all data up to step k are held too, :meth:`smoothed`. Each step more
+        needs n generators more: ``max_generators`` is at least ``n (L + 1)``; ``None``: ``max(20, 3 n) + n L``.
 
     Raises
     ------
@@ -73,6 +66,10 @@ class LSUCZ(Filter):
     Beside the constrained zonotope the filter holds a box: the interval hull *before* each reduction, carried on by
     interval arithmetic. :meth:`bounds` is the meet of that box and the hull of :attr:`support`, so that a reduction
     never widens what was known. What is asked of the filter between two steps does not change its later results.
+
+    Fixed-lag smoothing holds the set of the stacked state: ``{c_l + G_l ξ : |ξ|∞ ≤ 1, A ξ = b}`` for x_{k−l}, one ξ for
+    all l. A time update appends columns, a strip appends a row, and a reduction encloses all rows together. Without
+    reduction these are the sets of x_{k−l} given all data, exact but for rounding.
     """
 
     kind: ClassVar[str] = "LSUCZ"
@@ -91,20 +88,26 @@ class LSUCZ(Filter):
         max_constraints: int | None = 8,
         point: Literal["hull", "nearest"] = "hull",
         reduce: bool = True,
+        lag: int = 0,
     ) -> None:
         n = model.state_count
+        if lag < 0:
+            raise ModelError(f"lag must not be negative, it is {lag}")
+        least = n * (lag + 1)
         if point not in ("hull", "nearest"):
             raise ModelError(f'point must be "hull" or "nearest", it is {point!r}')
-        if max_generators is not None and max_generators < n:
-            raise ModelError(f"max_generators must be at least {n}, the number of states, it is {max_generators}")
+        if max_generators is not None and max_generators < least:
+            number = "the number of states" if not lag else f"the states of {lag + 1} steps"
+            raise ModelError(f"max_generators must be at least {least}, {number}, it is {max_generators}")
         if max_constraints is not None and max_constraints < 0:
             raise ModelError(f"max_constraints must not be negative, it is {max_constraints}")
         self._model = model
         self._arrays = kernel_model(model)
         if max_generators is None:
-            max_generators = max(GENERATORS, GENERATORS_PER_STATE * n)
+            max_generators = max(GENERATORS, GENERATORS_PER_STATE * n) + n * lag
         self._limits = Limits(max_generators, max_constraints) if reduce else Limits(None, None)
         self._point_rule = point
+        self._lag = lag
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
     @property
@@ -113,11 +116,30 @@ class LSUCZ(Filter):
         return self._model
 
     @property
+    def lag(self) -> int:
+        """L: so many steps back :meth:`smoothed` goes."""
+        return self._lag
+
+    @property
     def support(self) -> ConstrainedZonotope:
         """The constrained zonotope that holds the state."""
         if self._support is None:
-            self._support = ConstrainedZonotope.of_arrays(*self._held.body)
+            self._support = self.smoothed(0)
         return self._support
+
+    def smoothed(self, steps: int) -> ConstrainedZonotope:
+        """The set of x_{k−steps} given all data so far, ``0 ≤ steps ≤ lag``.
+
+        Raises ``ModelError`` where no state of so many steps back is held: beyond the lag, or before the start.
+        """
+        place = self._place(steps)
+        return ConstrainedZonotope.of_arrays(*body_of(self._held.body, place, self._model.state_count))
+
+    def smoothed_bounds(self, steps: int) -> tuple[Vector, Vector]:
+        """Bounds (n,), (n,) of x_{k−steps} given all data so far: of :meth:`smoothed`, met with the box beside it."""
+        n, place = self._model.state_count, self._place(steps)
+        lower, upper = self._stack_bounds()
+        return lower[place * n : (place + 1) * n], upper[place * n : (place + 1) * n]
 
     @property
     def point(self) -> Vector:
@@ -129,12 +151,9 @@ class LSUCZ(Filter):
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull of the support met with the box that is held beside it; (n,), (n,)."""
-        if self._held.is_hull:
-            return self._held.lower, self._held.upper
-        if self._bounds is None:
-            lower, upper = self.support.bounds()
-            self._bounds = np.maximum(lower, self._held.lower), np.minimum(upper, self._held.upper)
-        return self._bounds
+        lower, upper = self._stack_bounds()
+        n = self._model.state_count
+        return lower[:n], upper[:n]
 
     def volume(self) -> float:
         """Volume of :attr:`support` up to dimension 3, above it of :meth:`bounds`: cheap enough for each step."""
@@ -164,12 +183,33 @@ class LSUCZ(Filter):
         arrays = self._arrays if model is None else step_arrays(used)
         C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r=r, u=u, image=self._image)
         if not np.isnan(values).all():
-            c, G, A, b = self._held.body
-            cut = (c, *meet_strips(c, G, A, b, C, values, widths))
             try:
-                self._hold(self._settled(cut, self._held.lower, self._held.upper))
+                self._cut(rows_of(C, 0, self._depth), values, widths)
             except InconsistentData as contradiction:
                 raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
+        return self.support
+
+    def update_late(
+        self,
+        y: ArrayLike,
+        steps: int,
+        r: ArrayLike | None = None,
+        model: LSUModel | None = None,
+        u: ArrayLike | Orthotope | None = None,
+    ) -> ConstrainedZonotope:
+        """Data update with y (m,) of ``steps`` steps ago, within the lag; r, model and u are those of that step.
+
+        Without reduction the sets are those that the data give in order. Raises as :meth:`update` and :meth:`smoothed`.
+        """
+        used, place = same_states(self._model, model), self._place(steps)
+        arrays = self._arrays if model is None else step_arrays(used)
+        image = partial(self._image, place=place)
+        values, widths = plain_strips(used, arrays, y, r=r, u=u, image=image)
+        if not np.isnan(values).all():
+            try:
+                self._cut(rows_of(arrays.C, place, self._depth), values, widths)
+            except InconsistentData as contradiction:
+                raise strip_contradiction(used.outputs, *image(arrays.C), values, widths) from contradiction
         return self.support
 
     def predict(
@@ -182,18 +222,18 @@ class LSUCZ(Filter):
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
         center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
-        body, (lower, upper) = self._held.body, self.bounds()
+        body, (lower, upper) = self._held.body, self._stack_bounds()
         if not self._limits.allow(body):
             body, lower, upper = self._settled(body, lower, upper)[:3]
+        step = stacked_step(arrays, self._depth, self._lag)
         box = np.array([lower, upper])  # one compiled kernel serves, whether or not the bounds may be written
-        finite, body, lower, upper = predict_constrained(
-            body, box[0], box[1], arrays.A, arrays.B, center, arrays.G, widths
-        )
-        keep_constants(box[0], box[1], arrays.A, arrays.B, center, arrays.G, widths, lower, upper)
+        finite, body, lower, upper = predict_constrained(body, box[0], box[1], step.R, step.B, center, step.G, widths)
+        n = len(arrays.A)
+        keep_constants(box[0, :n], box[1, :n], arrays.A, arrays.B, center, arrays.G, widths, lower[:n], upper[:n])
         if not finite:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
         held = Held(body, lower, upper, is_hull=False)
-        self._hold(held if used.domain is None else _within(held, used.domain))
+        self._hold(held if used.domain is None else within(held, used.domain))
         return self.support
 
     def condition(self, support: Support, gain: GainOf | None = "support") -> float:
@@ -219,11 +259,12 @@ class LSUCZ(Filter):
         own, before = self._held, self.bounds()
         try:
             lower, upper = other.bounds()
-            box = np.maximum(before[0], lower), np.minimum(before[1], upper)
+            newest = np.maximum(before[0], lower), np.minimum(before[1], upper)
+            box = [with_newest(side, cut) for side, cut in zip(self._stack_bounds(), newest, strict=True)]
             met = joined(own.body, before, other, self._most_transferred)
             if met is own.body:  # it lies in the other set
                 return 0.0
-            self._hold(self._settled(met, *box))
+            self._hold(self._settled(met, box[0], box[1]))
         except InconsistentData as contradiction:
             raise InconsistentData(
                 f"the set of {self.kind} and the transferred set have no point in common"
@@ -247,8 +288,8 @@ class LSUCZ(Filter):
 
     @property
     def is_resumable(self) -> bool:
-        """The set and the box are all that is held."""
-        return True
+        """Without a lag the set and the box are all that is held."""
+        return not self._lag
 
     def snapshot(self) -> Held:
         """The set and the box; neither is ever written again."""
@@ -259,6 +300,36 @@ class LSUCZ(Filter):
         if not isinstance(snapshot, Held):
             raise ModelError(f"the snapshot must be one of LSUCZ, it is {type(snapshot).__name__}")
         self._hold(snapshot)
+
+    @property
+    def _depth(self) -> int:
+        """So many states are held, the newest first."""
+        return self._held.lower.size // self._model.state_count
+
+    def _place(self, steps: int) -> int:
+        if not 0 <= steps < self._depth:
+            held = self._depth - 1
+            raise ModelError(
+                f"the set of {steps} steps ago is not held: the lag is {self._lag}, {held} steps are there"
+            )
+        return steps
+
+    def _stack_bounds(self) -> tuple[Vector, Vector]:
+        if self._held.is_hull:
+            return self._held.lower, self._held.upper
+        if self._bounds is None:  # the box of the earlier states is the hull that they had before the time update
+            n, (lower, upper) = self._model.state_count, self.support.bounds()
+            self._bounds = (
+                with_newest(self._held.lower, np.maximum(lower, self._held.lower[:n])),
+                with_newest(self._held.upper, np.minimum(upper, self._held.upper[:n])),
+            )
+        return self._bounds
+
+    def _cut(self, P: Matrix, values: Vector, widths: Vector) -> None:
+        """Keep the part in the strips ``|values − P x| ≤ widths``, P (m, n depth), NaN for no strip."""
+        c, G, A, b = self._held.body
+        cut = (c, *meet_strips(c, G, A, b, P, values, widths))
+        self._hold(self._settled(cut, self._held.lower, self._held.upper))
 
     def _hold(self, held: Held) -> None:
         self._held = held
@@ -273,13 +344,8 @@ class LSUCZ(Filter):
         return Held(settled.body, settled.lower, settled.upper, is_hull=True)
 
     def _size(self, body: Body) -> float:
-        """Σ log of a set's widths along the axes and their diagonals, axes in units of the box that is held."""
-        widths = self._held.upper - self._held.lower
-        scaled = np.diag(1.0 / np.where(widths > 0, widths, 1.0))
-        first, second = _pairs(widths.size)
-        directions = np.vstack([scaled, scaled[first] + scaled[second], scaled[first] - scaled[second]])
-        low, high = ConstrainedZonotope.of_arrays(*body).ranges(directions)
-        return float(np.log(np.maximum(high - low, np.finfo(np.float64).tiny)).sum())
+        n = self._model.state_count
+        return log_size(body_of(body, 0, n), (self._held.upper - self._held.lower)[:n])
 
     @property
     def _most_transferred(self) -> int | None:
@@ -287,29 +353,8 @@ class LSUCZ(Filter):
         limit = self._limits.generators
         return None if limit is None else 3 * max(limit, self._model.state_count)
 
-    def _image(self, C: Matrix) -> tuple[Vector, Vector]:
-        """Bounds of ``C x``."""
-        low, high = self.support.ranges(C)
-        box_low, box_high = image_of_box(C, *self.bounds())
+    def _image(self, C: Matrix, place: int = 0) -> tuple[Vector, Vector]:
+        """Bounds of ``C x``, x of ``place`` steps ago."""
+        low, high = (self.support if place == 0 else self.smoothed(place)).ranges(C)
+        box_low, box_high = image_of_box(C, *self.smoothed_bounds(place))
         return np.maximum(low, box_low), np.minimum(high, box_high)
-
-
-@functools.cache
-def _pairs(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    return np.triu_indices(n, 1)
-
-
-def _within(held: Held, domain: Orthotope) -> Held:
-    """Meet with the domain; only coordinates in which the set exceeds it cost a generator and a constraint."""
-    c, G, A, b = held.body
-    lower, upper = np.maximum(held.lower, domain.lower), np.minimum(held.upper, domain.upper)
-    exceeded = (held.lower < domain.lower) | (held.upper > domain.upper)
-    body = held.body
-    if exceeded.any():
-        low, high = ConstrainedZonotope.of_arrays(*held.body).bounds()
-        exceeded &= (low < domain.lower) | (high > domain.upper)
-        middle = np.where(exceeded, domain.center, np.nan)
-        body = (c, *meet_strips(c, G, A, b, np.eye(domain.dim), middle, np.array(domain.half_widths)))
-    if (lower > upper).any() or ConstrainedZonotope.of_arrays(*body).is_empty():
-        raise InconsistentData("the prediction is proved to miss the domain")
-    return Held(body, lower, upper, is_hull=False)

@@ -66,13 +66,14 @@ def meet_sets(
 ) -> tuple[Array, Array, Array]:
     """``Z ∩ Y`` (Scott et al. 2016, eq. 13 with R = I): rows ``G ξ − G₂ η = c₂ − c``; returns G, A, b.
 
-    ``G`` and ``G₂`` are copied, which is exact; only ``c₂ − c`` is rounded.
+    ``G`` and ``G₂`` are copied, which is exact; only ``c₂ − c`` is rounded. Where Z has more rows than Y, Y tells of
+    the first ones: R = [I 0].
     """
-    n, g = G.shape
+    n, g = c2.size, G.shape[1]
     g2 = G2.shape[1]
     m = A.shape[0]
     m2 = A2.shape[0]
-    generators = padded(G, n, g + g2)
+    generators = padded(G, c.size, g + g2)
     rows = padded(A, m + m2 + n, g + g2)
     sides = np.empty(m + m2 + n)
     for i in range(m):

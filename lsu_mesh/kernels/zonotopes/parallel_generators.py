@@ -54,7 +54,8 @@ def _are_parallel(L: Array, i: int, j: int, p: int, scale: Array) -> bool:
     for s in range(L.shape[0]):
         if scale[s] > 0.0:
             most = max(most, abs(L[s, j] - t * L[s, i]) / scale[s])
-    return most <= bound
+    is_small: bool = most <= bound
+    return is_small
 
 
 @inner

@@ -16,25 +16,26 @@ Body = tuple[Array, Array, Array, Array]
 def predict_constrained(
     body: Body, lower: Array, upper: Array, R: Array, B: Array, u: Array, N: Array, widths: Array
 ) -> tuple[bool, Body, Array, Array]:
-    """Time update ``R X ⊕ B u ⊕ N box(widths)``; R (n, n), B (n, p), u (p,), N (n, q), widths (q,).
+    """Time update ``R X ⊕ B u ⊕ N box(widths)``; R (k, n), B (k, p), u (p,), N (k, q), widths (q,).
 
     The set gets a generator per noise of positive width; those along the axes take the rounding of centre and
-    generators, else generators are added for it. The box is carried by interval arithmetic. ``False`` where numbers
-    overflow.
+    generators, else generators are added for it. The box is carried by interval arithmetic. A row that copies a
+    coordinate and that nothing drives is exact. ``False`` where numbers overflow.
     """
     c, G, A, b = body
     n, g = G.shape
+    rows = R.shape[0]
     q = 0
     for k in range(widths.size):
         if widths[k] > 0.0:
             q += 1
-    centre = np.empty(n)
-    generators = np.zeros((n, g + q))
-    slack = np.empty(n)
-    low = np.empty(n)
-    high = np.empty(n)
+    centre = np.empty(rows)
+    generators = np.zeros((rows, g + q))
+    slack = np.empty(rows)
+    low = np.empty(rows)
+    high = np.empty(rows)
     finite = True
-    for i in range(n):
+    for i in range(rows):
         shift = 0.0
         inputs = 0.0
         for k in range(u.size):
@@ -63,15 +64,30 @@ def predict_constrained(
                 mass += size_of_product(R[i, s], G[s, j])
             generators[i, j] = entry
         centre[i] = total
-        slack[i] = 0.0 if mass == 0.0 else up(gamma(n + u.size + 4) * mass + UNDERFLOW)
+        copied = copied_coordinate(R[i]) if inputs == 0.0 and spread == 0.0 else -1
+        slack[i] = 0.0 if mass == 0.0 or copied >= 0 else up(gamma(n + u.size + 4) * mass + UNDERFLOW)
         lost = up(gamma(u.size + widths.size + 4) * (inputs + spread) + UNDERFLOW)
         least, most = image_of_interval(R[i], lower, upper)
         low[i] = down(down(least + shift) - up(spread + lost))
         high[i] = up(up(most + shift) + up(spread + lost))
+        if copied >= 0:
+            low[i], high[i] = lower[copied], upper[copied]
         finite = finite and np.isfinite(total) and np.isfinite(slack[i])
         finite = finite and np.isfinite(low[i]) and np.isfinite(high[i])
     generators, columns = absorb_box(generators, padded(A, A.shape[0], g + q), slack)
     return finite, (centre, generators, columns, b), low, high
+
+
+@inner
+def copied_coordinate(row: Array) -> int:
+    """The coordinate that a row of a map copies; −1 where it does anything else."""
+    found = -1
+    for s in range(row.size):
+        if row[s] == 1.0 and found < 0:
+            found = s
+        elif row[s] != 0.0:
+            return -1
+    return found
 
 
 @inner
