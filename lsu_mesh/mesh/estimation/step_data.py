@@ -20,7 +20,7 @@ from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.filters.timed_data import TimedDatum, cut
 from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
 from lsu_mesh.mesh.estimation.time_update import Origin
-from lsu_mesh.mesh.measurement_time import tolerance_ns
+from lsu_mesh.mesh.measurement_time import goes_to_nearest, tolerance_ns
 from lsu_mesh.mesh.messages import Input, Measurement, Reference
 from lsu_mesh.mesh.time_requirements import ONE_UPDATE
 from lsu_mesh.model import ContinuousModel
@@ -207,7 +207,7 @@ class DataOfSteps:
         first, end = configuration.grid.time_of(1), configuration.grid.time_of(k)
         is_on_grid = error == 0 and time == end
         sensor = configuration.sensors[message.name]
-        is_nearest = configuration.continuous is None and sensor.off_grid == "nearest" and not sensor.rate
+        is_nearest = goes_to_nearest(configuration, sensor)
         if message.step < 1 or (not is_on_grid and not is_nearest and time - error < first):
             return BEFORE_PRIOR
         if configuration.continuous is not None and not is_on_grid:

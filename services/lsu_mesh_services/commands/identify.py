@@ -19,10 +19,10 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.data_files.spans import duration_text
 from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.measurement_time import goes_to_nearest
 from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
 from lsu_mesh.mesh.nodes.played_rows import PlayedRows
 from lsu_mesh.mesh.nodes.recorded_inputs import recorded_inputs
-from lsu_mesh.mesh.nodes.time_fields import goes_to_nearest
 from lsu_mesh_services.configuration import load_or_explain, print_warnings
 from lsu_mesh_services.exit_codes import FAILURE, NOT_MET, OK, USAGE
 from lsu_mesh_services.played_files import accounts_or_explain
