@@ -123,6 +123,28 @@ def test_no_set_misses_and_all_are_recomputed(tmp_path: Path, error_ms: int, del
 
 
 @pytest.mark.parametrize("error_ms", [0, 5])
+def test_sets_verify_where_the_box_drives_a_step_after_one_whose_input_is_known(tmp_path: Path, error_ms: int) -> None:
+    """The input before may still act, and nothing else is brought to the set: no data come for some steps."""
+    lost, silent = {9, 10, 15, 22}, {*range(9, 13), 16, *range(22, 25)}
+    driven = Driven(3, 30 * MS)
+    configuration = made(tmp_path / "driven.toml", driven, error_ms * MS, 30 * MS)
+    grid = configuration.grid
+    sent = [
+        (t, message)
+        for t, message in traffic(configuration, driven, 3, error_ms * MS)
+        if not (message.step in lost if isinstance(message, Input) else grid.step_of(message.time_ns) in silent)  # type: ignore[attr-defined]
+    ]
+    mesh = run(configuration, sent)
+    assert Misses().look(mesh, driven.course.at).outside == 0
+    alone = [
+        one for one in mesh.posteriors("main") if [r[0] for r in one.used] == ["input"] and one.status == "predicted"
+    ]
+    assert {one.step for one in alone} >= {10, 23}, "a step of which nothing but the input before is known"
+    found = verify(configuration, [message for _, message in mesh.sent])
+    assert (found.differences, found.false_claims, found.unverifiable) == ([], [], [])
+
+
+@pytest.mark.parametrize("error_ms", [0, 5])
 def test_inputs_that_come_late_end_in_the_same_sets(tmp_path: Path, error_ms: int) -> None:
     driven = Driven(7)
     configuration = made(tmp_path / "driven.toml", driven, error_ms * MS)
