@@ -21,6 +21,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("systems", "simulation", "metrics"),
         ("filters", "fusion"),
         ("identification", "testing"),
+        ("rate_identification",),
         ("experiments", "mesh"),
     ],
     "lsu_mesh.kernels": [

@@ -63,7 +63,7 @@ def take(found: Run, messages: list) -> None:  # type: ignore[type-arg]
 
 
 def invented(folder: Path, seed: int, seconds: int) -> tuple[Path, Course]:
-    """A flight with ± 8 ft/s² all the time, and reports up to 1.6 s old in cells of 25 ft, as convert.py writes them."""
+    """A flight with ± 8 ft/s² all the time; reports up to 1.6 s old in cells of 25 ft, in rows as convert.py's."""
     rng = np.random.default_rng(seed)
     ends, now, speed = [0], 0, Fraction(0)
     signs = []
