@@ -138,12 +138,12 @@ class Recomputation:
         if message.time_error_ns is None:
             return TimedDatum(end, y, outputs=outputs, sensor=message.name)
         if configuration.continuous is not None:
-            return TimedDatum(message.time_ns, y, message.time_error_ns, outputs, sensor=message.name)
+            return TimedDatum(message.time_ns, y, message.time_error_ns, outputs=outputs, sensor=message.name)
         r = grid_half_widths(
             outputs, None, message.time_ns, error_ns=message.time_error_ns, step_ns=end,
             tolerance_ns=tolerance_ns(sensor), rate=sensor.rate or None, off_grid=sensor.off_grid,
         )  # fmt: skip
-        return TimedDatum(end, y, 0, outputs, r, message.name)
+        return TimedDatum(end, y, outputs=outputs, r=r, sensor=message.name)
 
     def _update_at_once(self, engine: Filter, name: str, data: Sequence[TimedDatum]) -> None:
         """One datum of each sensor at t_k at most: one update takes all."""
