@@ -26,6 +26,6 @@ def adopted_model(configuration: Configuration, settings: FilterSettings, messag
     return configuration.model(settings.sensors).replace(rho=message.rho, r=r)
 
 
-def filter_algorithm(settings: FilterSettings, engine: Filter) -> int:
+def filter_algorithm(settings: FilterSettings, engine: Filter | type[Filter]) -> int:
     """Number of the arithmetic of a filter's sets; with that of conditioning, where it takes transfers."""
     return engine.algorithm + (engine.conditioning - 1 if settings.transfer != "off" else 0)
