@@ -35,7 +35,7 @@ from lsu_mesh.mesh.messages import (
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.estimator import Estimator
-from lsu_mesh.mesh.nodes.filter_events import dropped_event, rejected_event
+from lsu_mesh.mesh.nodes.filter_events import dropped_event, rejected_event, widened_event
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.source_timeout import input_key
 from lsu_mesh.mesh.nodes.starting import About
@@ -230,7 +230,7 @@ class FilterNode(Estimator):
         if outcome.status == "ok":
             self._factor = outcome.factor
             self.held.downgrade_guarantee("learned")
-            return outcome, [*messages, self._widened_event(k, outcome.error, now)]
+            return outcome, [*messages, widened_event(self, k, outcome, now=now)]
         epoch = self.held.epochs.number
         messages += self._drop(data, outcome, now)
         if epoch != self.held.epochs.number:
@@ -259,10 +259,6 @@ class FilterNode(Estimator):
         self._is_tested = self._is_tested or k > self._started_at
 
     # -- contradictions
-
-    def _widened_event(self, k: int, error: InconsistentData, now: int) -> Message:
-        text = f"step {k}: {error}; r was widened by {self._factor:.4g} in this step, the set is no longer guaranteed"
-        return self.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": self._factor})
 
     def _drop(self, data: StepData, outcome: FilterOutcome, now: int) -> list[Message]:
         """Tell what was left out because it contradicts the prediction; reset when it goes on."""

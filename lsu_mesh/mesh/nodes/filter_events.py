@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lsu_mesh.mesh.estimation.filter_step import RejectedTransfer
+from lsu_mesh.mesh.estimation.filter_step import FilterOutcome, RejectedTransfer
 from lsu_mesh.mesh.estimation.inconsistency import DroppedStrip
 from lsu_mesh.mesh.messages import Message
 from lsu_mesh.mesh.nodes.node import Node
@@ -30,3 +30,10 @@ def rejected_event(node: Node, k: int, rejected: RejectedTransfer, *, now: int) 
     source = rejected.message.src
     text = f"step {k}: the transfer from {source} was left out: {rejected.reason}"
     return node.event("WARN", "transfer-rejected", text, now=now, step=k, about={"source": source, "step": k})
+
+
+def widened_event(node: Node, k: int, outcome: FilterOutcome, *, now: int) -> Message:
+    """r was widened in a step, so that it explains the data."""
+    widened = f"r was widened by {outcome.factor:.4g} in this step, the set is no longer guaranteed"
+    text = f"step {k}: {outcome.error}; {widened}"
+    return node.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": outcome.factor})
