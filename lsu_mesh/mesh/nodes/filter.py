@@ -8,10 +8,10 @@ from dataclasses import replace
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
+from lsu_mesh.mesh.estimation.adoption import adopted_model, filter_algorithm, is_due, make_engine
 from lsu_mesh.mesh.estimation.filter_step import (
     FilterOutcome,
-    RejectedTransfer,
+    Transfers,
     contradiction_rule,
     filter_step,
 )
@@ -19,6 +19,7 @@ from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
 from lsu_mesh.mesh.estimation.message_fields import can_foretell, described, finite_or_none, foretold
 from lsu_mesh.mesh.estimation.received_data import ReceivedData
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
+from lsu_mesh.mesh.estimation.send_on_gain import SendOnGain
 from lsu_mesh.mesh.estimation.step_data import BEFORE_PRIOR, StepData, Unused
 from lsu_mesh.mesh.estimation.step_record import Combined, Step
 from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, Transfer
@@ -34,7 +35,7 @@ from lsu_mesh.mesh.messages import (
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.estimator import Estimator
-from lsu_mesh.mesh.nodes.filter_events import dropped_event
+from lsu_mesh.mesh.nodes.filter_events import dropped_event, rejected_event, widened_event
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.source_timeout import input_key
 from lsu_mesh.mesh.nodes.starting import About
@@ -72,6 +73,9 @@ class FilterNode(Estimator):
         self._factor = 1.0
         """By how much r was widened in the current step."""
         self._counts["transfers rejected"] = 0
+        self._send_on_gain = SendOnGain(configuration, settings)
+        if settings.publish_when:
+            self._counts["predictions not sent"] = 0
         self._announced: Suggestion | None = None
         """Bounds that are adopted at a step to come."""
 
@@ -180,6 +184,7 @@ class FilterNode(Estimator):
             origin=origin,
             cause=self._cause(outcome),
             gain=outcome.gain,
+            gain_of=outcome.gain_of,
         ), messages
 
     def _adopt(self, k: int, now: int) -> list[Message]:
@@ -202,16 +207,17 @@ class FilterNode(Estimator):
         """The step's transfers and data, and what the node does where they contradict the set."""
         k, inputs, is_replay = data.k, self.timeline.inputs, step.transfers is not None
         before = self.engine.snapshot()
-        outcome = filter_step(
-            self.engine,
-            data,
+        transfers = Transfers(
             self._transfers(k, step, inputs),
-            as_set=lambda message: self._transfer.as_set(message, k, self.engine, inputs),
-            rule=contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse",
+            lambda message: self._transfer.as_set(message, k, self.engine, inputs),
+            self.settings.transfer_gain,
         )
+        rule = contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse"
+        outcome = filter_step(self.engine, data, transfers, rule)
         # a transfer that misses the set was told of when the step was first done
         rejected = [one for one in outcome.rejected if one.by_data or not is_replay]
-        messages = [self._transfer_event(k, one, now) for one in rejected]
+        self._counts["transfers rejected"] += len(rejected)
+        messages = [rejected_event(self, k, one, now=now) for one in rejected]
         if outcome.error is None:
             if outcome.status == "ok":
                 self._agree(k)
@@ -220,15 +226,15 @@ class FilterNode(Estimator):
         if not self._is_tested:
             self.engine.restore(before)
             start = self._refuse_start(data, outcome.error, now)
-            return replace(outcome, transfers=(), gain=None), [*messages, *start]
+            return replace(outcome, transfers=(), gain=None, gain_of=None), [*messages, *start]
         if outcome.status == "ok":
             self._factor = outcome.factor
             self.held.downgrade_guarantee("learned")
-            return outcome, [*messages, self._widened_event(k, outcome.error, now)]
+            return outcome, [*messages, widened_event(self, k, outcome, now=now)]
         epoch = self.held.epochs.number
         messages += self._drop(data, outcome, now)
         if epoch != self.held.epochs.number:
-            outcome = replace(outcome, transfers=(), gain=None)
+            outcome = replace(outcome, transfers=(), gain=None, gain_of=None)
         return outcome, messages
 
     def _transfers(self, k: int, step: Step, inputs: Mapping[int, Input]) -> list[Prediction | Fused]:
@@ -240,12 +246,6 @@ class FilterNode(Estimator):
             step.transfers = self._transfer.available(k, inputs, self.held.epochs, needs_inputs=has_inputs)
             self._transfer.forget_before(k - MAX_BOX_AGE)
         return [message for message in step.transfers if not self.held.epochs.is_abandoned(message)]
-
-    def _transfer_event(self, k: int, rejected: RejectedTransfer, now: int) -> Message:
-        self._counts["transfers rejected"] += 1
-        source = rejected.message.src
-        text = f"step {k}: the transfer from {source} was left out: {rejected.reason}"
-        return self.event("WARN", "transfer-rejected", text, now=now, step=k, about={"source": source, "step": k})
 
     @staticmethod
     def _cause(outcome: FilterOutcome) -> str | None:
@@ -259,10 +259,6 @@ class FilterNode(Estimator):
         self._is_tested = self._is_tested or k > self._started_at
 
     # -- contradictions
-
-    def _widened_event(self, k: int, error: InconsistentData, now: int) -> Message:
-        text = f"step {k}: {error}; r was widened by {self._factor:.4g} in this step, the set is no longer guaranteed"
-        return self.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": self._factor})
 
     def _drop(self, data: StepData, outcome: FilterOutcome, now: int) -> list[Message]:
         """Tell what was left out because it contradicts the prediction; reset when it goes on."""
@@ -370,13 +366,17 @@ class FilterNode(Estimator):
             missing=list(combined.missing),
             cause=combined.cause,
             gain=None if combined.gain is None else finite_or_none(combined.gain),
-            algorithm=self.engine.algorithm,
+            gain_of=combined.gain_of,
+            algorithm=filter_algorithm(self.settings, self.engine),
         )
 
     def prediction(self, k: int, now: int) -> list[Message]:
+        held = self.held
         if not can_foretell(self.engine, self.configuration.input_box):
             return []
-        held = self.held
+        if not self._send_on_gain.publishes(k, held, self.timeline.inputs):
+            self._counts["predictions not sent"] += 1
+            return []
         is_input_known = self.timeline.has_input(k - 1) or not self.engine.model.input_count
         return [
             Prediction(
@@ -390,6 +390,6 @@ class FilterNode(Estimator):
                 used=list(held.used),
                 bounds=self.noise_bounds(),
                 missing=[] if is_input_known else ["input"],
-                algorithm=self.engine.algorithm,
+                algorithm=filter_algorithm(self.settings, self.engine),
             )
         ]
