@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Vector
+from lsu_mesh.filters.density import Density, PointRule
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -73,7 +74,20 @@ class Filter(ABC):
     @property
     @abstractmethod
     def point(self) -> Vector:
-        """Point estimate (n,) of the state now."""
+        """Point estimate (n,) of the state now, by the :attr:`point_rule`."""
+
+    @property
+    def point_rule(self) -> PointRule:
+        """``"mean"`` and ``"nearest"``: :attr:`point` is never proved to lie outside of :attr:`support` or bounds.
+
+        ``"centre"``: it may, as the centre of a hull may; what a class says that promises nothing.
+        """
+        return "centre"
+
+    @property
+    def density(self) -> Density | None:
+        """Mean and covariance beside the set that the point estimate is taken from; ``None`` where there are none."""
+        return None
 
     @abstractmethod
     def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
@@ -129,10 +143,11 @@ class Filter(ABC):
     def reset(self, support: Support) -> None:
         """Start again from a set that is known to hold the state now."""
 
-    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+    def resume(self, support: Support, lower: Vector, upper: Vector, density: Density | None = None) -> None:
         """Continue from what a filter of this class published: its :attr:`support` and its :meth:`bounds` (n,), (n,).
 
-        The later sets are those of that filter, bit by bit, if :attr:`is_resumable`.
+        The later sets are those of that filter, bit by bit, if :attr:`is_resumable`, and the later points too with its
+        :attr:`density`, which is only given to a filter that has one.
         """
         self.reset(support)
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
+from lsu_mesh.filters.density import PointOption, PointRule, point_rule
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.transfer_gain import hull_gain, measured
@@ -41,6 +42,8 @@ class Kalman(Filter):
         gives mean and variance of x_1.
     sigmas:
         The published box is ``x̂ ± sigmas · √diag P``. It is *no* guaranteed bound.
+    point:
+        The rule of the point estimate, of any of which the mean is the point: it is the centre of the box.
 
     Raises
     ------
@@ -55,13 +58,18 @@ class Kalman(Filter):
     _held: Gaussian
 
     def __init__(
-        self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], sigmas: float = 3.0
-    ) -> None:  # fmt: skip
+        self,
+        model: LSUModel,
+        prior: Support | tuple[ArrayLike, ArrayLike],
+        sigmas: float = 3.0,
+        point: PointOption = "mean",
+    ) -> None:
         if not (np.isfinite(sigmas) and sigmas > 0):
             raise ModelError(f"sigmas must be a number > 0, it is {sigmas}")
         self._model = model
         self._arrays = kernel_model(model)
         self._sigmas = sigmas
+        self._point_rule = point_rule(point)
         self.reset(checked_prior(model, prior))
 
     @property
@@ -78,6 +86,11 @@ class Kalman(Filter):
     def point(self) -> Vector:
         """Mean (n,)."""
         return np.array(self._held.mean)
+
+    @property
+    def point_rule(self) -> PointRule:
+        """The rule of :attr:`point`."""
+        return self._point_rule
 
     @property
     def covariance(self) -> Matrix:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from functools import partial
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
+from lsu_mesh.filters.density import Density, Drive, PointEstimate, PointOption, PointRule
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
@@ -22,6 +23,7 @@ from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constra
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.arrays import box_volume
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
+from lsu_mesh.supports.nearest_point import nearest_point, nearest_to_center
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.reduction import Body, Limits, settle
 from lsu_mesh.supports.support import Support
@@ -44,6 +46,8 @@ class Held(NamedTuple):
     upper: Vector
     is_hull: bool
     """Whether the box is the meet with the interval hull of the set already."""
+    density: Density | None = None
+    """Beside the set, for the point estimate; ``None`` in a set on the way: it then keeps the one in force."""
 
 
 class LSUCZ(Filter):
@@ -58,8 +62,9 @@ class LSUCZ(Filter):
         ``max(20, 3 n)``; as many constraints, ``None`` is no limit. A prediction has up to one generator per noise and
         state more, until the next data update.
     point:
-        ``"hull"``: centre of the interval hull (Method 1); ``"nearest"``: the point of the support that is nearest to
-        the centre of its generators' box (Method 2).
+        The point estimate: ``"mean"``: of the truncated density beside the set, moved into it; ``"nearest"``: the point
+        of the support that is nearest to the centre of its generators' box (Method 2); ``"centre"``: that of the
+        interval hull (Method 1), which may lie outside.
     reduce:
         ``False``: no limit of either kind, the set grows with every step.
 
@@ -85,12 +90,10 @@ class LSUCZ(Filter):
         prior: Support | tuple[ArrayLike, ArrayLike],
         max_generators: int | None = None,
         max_constraints: int | None = 8,
-        point: Literal["hull", "nearest"] = "hull",
+        point: PointOption = "mean",
         reduce: bool = True,
     ) -> None:
         n = model.state_count
-        if point not in ("hull", "nearest"):
-            raise ModelError(f'point must be "hull" or "nearest", it is {point!r}')
         if max_generators is not None and max_generators < n:
             raise ModelError(f"max_generators must be at least {n}, the number of states, it is {max_generators}")
         if max_constraints is not None and max_constraints < 0:
@@ -102,7 +105,7 @@ class LSUCZ(Filter):
             if reduce and max_generators > GENERATORS:  # it was GENERATORS for models of all sizes once
                 vars(self)["algorithm"] = max(2, type(self).algorithm)
         self._limits = Limits(max_generators, max_constraints) if reduce else Limits(None, None)
-        self._point_rule = point
+        self._estimate = PointEstimate(model, point)
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
     @property
@@ -121,9 +124,22 @@ class LSUCZ(Filter):
     def point(self) -> Vector:
         """Point estimate (n,) by the rule ``point``."""
         lower, upper = self.bounds()
-        if self._point_rule == "hull":
+        if self._estimate.rule == "centre":
             return 0.5 * lower + 0.5 * upper
-        return np.clip(self.support.nearest_to_center(), lower, upper)
+        if self._estimate.rule == "nearest":
+            return nearest_to_center(self.support, lower, upper)
+        target = self._estimate.target(self._held.density, lower, upper, lambda: 0.5 * lower + 0.5 * upper)
+        return nearest_point(self.support, target, lower, upper)
+
+    @property
+    def point_rule(self) -> PointRule:
+        """The rule of :attr:`point`."""
+        return self._estimate.rule
+
+    @property
+    def density(self) -> Density | None:
+        """Mean and covariance beside the set, of the rule ``"mean"``."""
+        return self._held.density
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull of the support met with the box that is held beside it; (n,), (n,)."""
@@ -165,9 +181,14 @@ class LSUCZ(Filter):
             c, G, A, b = self._held.body
             cut = (c, *meet_strips(c, G, A, b, C, values, widths))
             try:
-                self._hold(self._settled(cut, self._held.lower, self._held.upper))
+                held = self._settled(cut, self._held.lower, self._held.upper)
             except InconsistentData as contradiction:
                 raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
+            density = self._held.density
+            self._hold(held)
+            self._hold_density(
+                self._estimate.updated(density, arrays, values, widths=widths, bounds=self.bounds)
+            )  # fmt: skip
         return self.support
 
     def predict(
@@ -182,15 +203,18 @@ class LSUCZ(Filter):
         center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
         body, (lower, upper) = self._held.body, self.bounds()
         if not self._limits.allow(body):
-            body, lower, upper, _ = self._settled(body, lower, upper)
+            body, lower, upper = self._settled(body, lower, upper)[:3]
         box = np.array([lower, upper])  # one compiled kernel serves, whether or not the bounds may be written
         finite, body, lower, upper = predict_constrained(
             body, box[0], box[1], arrays.A, arrays.B, center, arrays.G, widths
         )
         if not finite:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
-        held = Held(body, lower, upper, is_hull=False)
+        density, held = self._held.density, Held(body, lower, upper, is_hull=False)
         self._hold(held if used.domain is None else _within(held, used.domain))
+        if density is not None:
+            drive = Drive(center, widths, has_rho=rho is not None)
+            self._hold_density(self._estimate.predicted(density, used, arrays, drive, bounds=self.bounds))
         return self.support
 
     def condition(self, support: Support, gain: GainOf | None = None) -> float:
@@ -226,12 +250,13 @@ class LSUCZ(Filter):
         given = checked_prior(self._model, support)
         body = given.to_constrained_zonotope().arrays
         lower, upper = given.bounds()
-        self._hold(Held(body, lower, upper, True) if self._limits.allow(body) else self._settled(body, lower, upper))
+        held = Held(body, lower, upper, True) if self._limits.allow(body) else self._settled(body, lower, upper)
+        self._hold(held._replace(density=self._estimate.started(lower, upper)))
 
-    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
-        """Go on from the set and the box as they are, bit by bit."""
+    def resume(self, support: Support, lower: Vector, upper: Vector, density: Density | None = None) -> None:
+        """Go on from the set, the box and the density as they are, bit by bit."""
         body = checked_prior(self._model, support).to_constrained_zonotope().arrays
-        self._hold(Held(body, lower, upper, is_hull=True))
+        self._hold(Held(body, lower, upper, True, self._estimate.resumed(density, lower, upper)))
 
     @property
     def is_resumable(self) -> bool:
@@ -249,9 +274,16 @@ class LSUCZ(Filter):
         self._hold(snapshot)
 
     def _hold(self, held: Held) -> None:
-        self._held = held
+        """Hold a set, beside which the density in force stays where it brings none."""
+        own = getattr(self, "_held", held).density
+        self._held = held if held.density is not None or own is None else held._replace(density=own)
         self._support = None
         self._bounds = None
+
+    def _hold_density(self, density: Density | None) -> None:
+        """Another density beside the same set."""
+        if density is not None:
+            self._held = self._held._replace(density=density)
 
     def _settled(self, body: Body, lower: Vector, upper: Vector) -> Held:
         """Hull, then reduction; raises ``InconsistentData`` where the set is proved empty."""

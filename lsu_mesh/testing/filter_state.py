@@ -144,7 +144,11 @@ class Witness:
         """A filter that says so goes on from the published set as this one does, bit by bit."""
         if not self._filter.is_resumable:
             return
-        other.resume(self._filter.support, *(side.copy() for side in self._filter.bounds()))
+        (lower, upper), density = self._filter.bounds(), self._filter.density
+        if density is None:
+            other.resume(self._filter.support, lower.copy(), upper.copy())
+        else:
+            other.resume(self._filter.support, lower.copy(), upper.copy(), density)
         held = self._filter.snapshot()
         act(self._filter)
         expected = state_of(self._filter)
