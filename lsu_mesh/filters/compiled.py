@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.density import Density, Drive, PointEstimate, PointOption, PointRule, noise_covariance
+from lsu_mesh.filters.density import Density, Drive, PointEstimate, noise_covariance
 from lsu_mesh.filters.filter import Filter, GainOf, OutputPrediction
 from lsu_mesh.filters.inconsistency import known_to_last_bits, strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import measured
 from lsu_mesh.filters.validation import (
     KernelModel,
@@ -191,9 +192,12 @@ class CompiledFilter(Filter):
         self._state = self._start(checked_prior(self._model, support))
         self._density = self._estimate.started(*self.bounds())
 
-    def resume(self, support: Support, lower: Vector, upper: Vector, density: Density | None = None) -> None:
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         self._state = self._continued(checked_prior(self._model, support), lower, upper)
-        self._density = self._estimate.resumed(density, lower, upper)
+        self._density = self._estimate.started(lower, upper)
+
+    def take_density(self, density: Density) -> None:
+        self._density = self._estimate.resumed(density)
 
     def _continued(self, support: Support, lower: Vector, upper: Vector) -> Matrix:
         """The state that published this support and these bounds."""

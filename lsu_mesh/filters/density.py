@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.array_types import Matrix, Vector
-from lsu_mesh.errors import ModelError
+from lsu_mesh.filters.point_rule import point_rule
 from lsu_mesh.filters.validation import KernelModel, kernel_model
 from lsu_mesh.kernels.filter_point import CENTRE, MEAN, NEAREST
 from lsu_mesh.kernels.points import density as kernels
@@ -21,9 +21,6 @@ from lsu_mesh.kernels.points.room import Room, room
 from lsu_mesh.kernels.points.stretch_noise import stretch_covariance
 from lsu_mesh.model import LSUModel
 
-PointRule = Literal["mean", "nearest", "centre"]
-PointOption = Literal["mean", "nearest", "centre", "hull"]
-"""A :data:`PointRule`, or ``"hull"``, the name that ``"centre"`` had before."""
 RULES = {"mean": MEAN, "nearest": NEAREST, "centre": CENTRE}
 Bounds = Callable[[], tuple[Vector, Vector]]
 
@@ -41,15 +38,6 @@ class Drive(NamedTuple):
     center: Vector
     widths: Vector
     has_rho: bool
-
-
-def point_rule(option: str) -> PointRule:
-    """The rule that an option names; ``ModelError`` for another word."""
-    if option == "hull":
-        return "centre"
-    if option not in get_args(PointRule):
-        raise ModelError(f'point must be "mean", "nearest" or "centre", it is {option!r}')
-    return option  # type: ignore[return-value]
 
 
 class PointEstimate:
@@ -80,10 +68,10 @@ class PointEstimate:
         kernels.start(np.array(lower), np.array(upper), mean, P)
         return Density(mean, P)
 
-    def resumed(self, density: Density | None, lower: Vector, upper: Vector) -> Density | None:
-        """A density that was published; without one that of the box."""
-        if density is None or self.rule != "mean":
-            return self.started(lower, upper)
+    def resumed(self, density: Density) -> Density | None:
+        """A density that was published, where the rule goes by one."""
+        if self.rule != "mean":
+            return None
         return Density(np.array(density.mean), np.array(density.covariance))
 
     def updated(

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Vector
-from lsu_mesh.filters.density import Density, PointRule
+from lsu_mesh.filters.density import Density
+from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -143,13 +144,16 @@ class Filter(ABC):
     def reset(self, support: Support) -> None:
         """Start again from a set that is known to hold the state now."""
 
-    def resume(self, support: Support, lower: Vector, upper: Vector, density: Density | None = None) -> None:
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Continue from what a filter of this class published: its :attr:`support` and its :meth:`bounds` (n,), (n,).
 
-        The later sets are those of that filter, bit by bit, if :attr:`is_resumable`, and the later points too with its
-        :attr:`density`, which is only given to a filter that has one.
+        The later sets are those of that filter, bit by bit, if :attr:`is_resumable`; the later points are with its
+        density, see :meth:`take_density`.
         """
         self.reset(support)
+
+    def take_density(self, density: Density) -> None:  # noqa: B027  a filter without a density has nothing to take
+        """After :meth:`resume` or :meth:`reset`: go on from this :attr:`density`, where the filter has one at all."""
 
     @property
     def is_resumable(self) -> bool:

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.filters.density import PointOption, PointRule, point_rule
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule, point_rule
 from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.model import LSUModel

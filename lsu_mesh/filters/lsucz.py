@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
-from lsu_mesh.filters.density import Density, Drive, PointEstimate, PointOption, PointRule
+from lsu_mesh.filters.density import Density, Drive, PointEstimate
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
@@ -253,10 +254,14 @@ class LSUCZ(Filter):
         held = Held(body, lower, upper, True) if self._limits.allow(body) else self._settled(body, lower, upper)
         self._hold(held._replace(density=self._estimate.started(lower, upper)))
 
-    def resume(self, support: Support, lower: Vector, upper: Vector, density: Density | None = None) -> None:
-        """Go on from the set, the box and the density as they are, bit by bit."""
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+        """Go on from the set and the box as they are, bit by bit."""
         body = checked_prior(self._model, support).to_constrained_zonotope().arrays
-        self._hold(Held(body, lower, upper, True, self._estimate.resumed(density, lower, upper)))
+        self._hold(Held(body, lower, upper, True, self._estimate.started(lower, upper)))
+
+    def take_density(self, density: Density) -> None:
+        """Go on from this density, with the rule ``"mean"``."""
+        self._hold_density(self._estimate.resumed(density))
 
     @property
     def is_resumable(self) -> bool:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
-from lsu_mesh.filters.density import PointOption
 from lsu_mesh.filters.filter import Guarantee
+from lsu_mesh.filters.point_rule import PointOption
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.intersection import Intersection

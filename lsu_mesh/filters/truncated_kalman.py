@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import ModelError
-from lsu_mesh.filters.density import PointOption
 from lsu_mesh.filters.kalman import Gaussian, Kalman
+from lsu_mesh.filters.point_rule import PointOption
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.density import Density, Drive, PointEstimate, PointOption, PointRule
+from lsu_mesh.filters.density import Density, Drive, PointEstimate
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.parallelotopes.box import keep_constants
@@ -264,7 +265,7 @@ class ZonotopicKalman(Filter):
         H = H if self._order is None else box_shortest(H, self._order, self._scaled)
         self._held = Held(c, H, *given.bounds(), _no_strips(c.size), self._estimate.started(*given.bounds()))
 
-    def resume(self, support: Support, lower: Vector, upper: Vector, density: Density | None = None) -> None:
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Go on from a zonotope and a box; in the predictor form data that wait have to be given again."""
         if not isinstance(support, Zonotope):
             raise ModelError(f"{self.kind} continues from a zonotope, not from {support!r}")
@@ -274,8 +275,12 @@ class ZonotopicKalman(Filter):
             lower=lower,
             upper=upper,
             pending=_no_strips(lower.size),
-            density=self._estimate.resumed(density, lower, upper),
+            density=self._estimate.started(lower, upper),
         )
+
+    def take_density(self, density: Density) -> None:
+        """Go on from this density, with the rule ``"mean"``."""
+        self._held = self._held._replace(density=self._estimate.resumed(density))
 
     @property
     def is_resumable(self) -> bool:

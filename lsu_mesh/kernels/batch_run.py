@@ -108,7 +108,7 @@ def sweep(
                 break
             if action != PREDICT or not bounded:
                 copy(target, S)
-            if rule == MEAN and (action == UPDATE or action == last_action):
+            if rule == MEAN and action in (UPDATE, last_action):
                 _follow(action == UPDATE, mean, P, A, B, C, Y[i, k], r, U[i, k], models.Q[j], G, widths, room)
                 if not density.is_finite(mean, P):
                     hull = row_of(room, S.shape[1], LOWER), row_of(room, S.shape[1], LOWER + 1)

@@ -59,7 +59,7 @@ def nearest_to_center(support: ConstrainedZonotope, lower: Vector, upper: Vector
 
 def settled(support: Support, point: Vector, lower: Vector, upper: Vector) -> Vector:
     """The point (n,), moved into the box, and as far into the set as is needed for it not to be proved outside."""
-    point = np.clip(point, lower, upper)
+    point = np.asarray(np.clip(point, lower, upper))
     if support.contains(point):
         return point
     c, G, A, b = support.to_constrained_zonotope().arrays

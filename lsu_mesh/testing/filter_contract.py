@@ -183,7 +183,7 @@ class _Run:
         point = [Fraction(v) for v in self._filter.point.tolist()]
         where = "" if inside_box(lower, upper, point) else f"the bounds [{lower}, {upper}]"
         if not where and is_outside(support, point, decided=False):
-            slack = ROUNDING * np.maximum(np.abs(lower), np.abs(upper))
+            slack = np.full(lower.size, ROUNDING * max(np.abs(lower).max(), np.abs(upper).max()))
             wider = support.minkowski_sum(Orthotope(-slack, slack))
             where = "the support" if is_outside(wider, point, decided=False) else ""
         self._witness.expect(

@@ -144,11 +144,9 @@ class Witness:
         """A filter that says so goes on from the published set as this one does, bit by bit."""
         if not self._filter.is_resumable:
             return
-        (lower, upper), density = self._filter.bounds(), self._filter.density
-        if density is None:
-            other.resume(self._filter.support, lower.copy(), upper.copy())
-        else:
-            other.resume(self._filter.support, lower.copy(), upper.copy(), density)
+        other.resume(self._filter.support, *(side.copy() for side in self._filter.bounds()))
+        if self._filter.density is not None:
+            other.take_density(self._filter.density)
         held = self._filter.snapshot()
         act(self._filter)
         expected = state_of(self._filter)

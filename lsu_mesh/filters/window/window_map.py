@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Counts, Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.filters.density import PointOption, PointRule, point_rule
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
+from lsu_mesh.filters.point_rule import PointOption, PointRule, point_rule
 from lsu_mesh.filters.transfer_gain import hull_gain, measured
 from lsu_mesh.filters.validation import checked_prior, input_interval, output_vector, same_states
 from lsu_mesh.filters.window.interval_estimate import interval_estimate

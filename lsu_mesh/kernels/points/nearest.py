@@ -8,8 +8,6 @@ an approximation; :func:`_reach` proves that the point lies in the set.
 
 from __future__ import annotations
 
-import math
-
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.parallelotopes.enclosure import inflate, residual_row
 from lsu_mesh.kernels.points.room import (
@@ -45,26 +43,30 @@ def nearest_point(c: Vector, T: Matrix, lower: Vector, upper: Vector, point: Vec
     """Move ``point`` (n,), from a target, to the nearest one in ``{c + T ξ : |ξ|∞ ≤ 1} ∩ [lower, upper]``.
 
     Returns whether it is proved to lie in both. Where the set is so thin that no nearest point can be proved, the
-    point is the centre c, moved into the box.
+    point is the centre c, if it lies in the box, else the nearest one without a proof.
     """
     n = c.size
     P, edges, residual = square_of(work, n, INVERSE), square_of(work, n, EDGES), row_of(work, n, RESIDUAL)
+    target, margin = row_of(work, n, TARGET), row_of(work, n, MARGIN)
     for i in range(n):
         point[i] = min(max(point[i], lower[i]), upper[i])
-    if _prepare(c, T, lower, upper, point, P=P, edges=edges, residual=residual, work=work):
-        if _is_proved(P, residual, c, point):
-            return True
-        target, margin = row_of(work, n, TARGET), row_of(work, n, MARGIN)
-        for i in range(n):
-            target[i] = point[i]
-        for least in (INSIDE, 0.0):
+    is_regular = _prepare(c, T, lower, upper, point, P=P, edges=edges, residual=residual, work=work)
+    if is_regular and _is_proved(P, residual, c, point):
+        return True
+    for i in range(n):
+        target[i] = point[i]
+    for least in (INSIDE, 0.0):
+        if is_regular:
             _margins(P, residual, c, lower, upper, least, margin)
             if _solve(P, c, lower, upper, target, margin, point, work) and _is_proved(P, residual, c, point):
                 return True
     is_inside = True
     for i in range(n):
         point[i] = min(max(c[i], lower[i]), upper[i])
+        margin[i] = 0.0
         is_inside = is_inside and point[i] == c[i]
+    if is_regular and not is_inside:
+        _solve(P, c, lower, upper, target, margin, point, work)
     return is_inside
 
 
@@ -104,18 +106,18 @@ def _prepare(
 
 @inlined
 def _row_is_zero(T: Matrix, i: int) -> bool:
+    largest = 0.0
     for j in range(T.shape[1]):
-        if T[i, j] != 0.0:
-            return False
-    return True
+        largest = max(largest, abs(T[i, j]))
+    return largest == 0.0
 
 
 @inlined
 def _column_is_zero(T: Matrix, j: int) -> bool:
+    largest = 0.0
     for i in range(T.shape[0]):
-        if T[i, j] != 0.0:
-            return False
-    return True
+        largest = max(largest, abs(T[i, j]))
+    return largest == 0.0
 
 
 @inner
@@ -123,13 +125,18 @@ def _is_proved(P: Matrix, residual: Vector, c: Vector, x: Vector) -> bool:
     """Whether ``T ξ = x − c`` is proved to have a solution with ``|ξ|∞ ≤ 1``.
 
     ``ξ = P (x − c) + (I − P T) ξ``, so ``|ξ|∞ ≤ |P (x − c)|∞ / (1 − max residual)``; a residual below 1 proves that T
-    is regular.
+    is regular. That bound, at most 2, times the residual of its row is what is not known of ``ξ_i``.
     """
     n = c.size
     largest, most = 0.0, 0.0
     for i in range(n):
         largest, most = max(largest, residual[i]), max(most, _reach(P, i, c, x))
-    return most + largest * (1.0 + 4.0 * EPSILON) <= 1.0 - 4.0 * EPSILON
+    if not (most <= 1.0 and largest <= MAX_RESIDUAL):
+        return False
+    most = 0.0
+    for i in range(n):
+        most = max(most, _reach(P, i, c, x) + 2.0 * residual[i] * (1.0 + 4.0 * EPSILON))
+    return most <= 1.0 - 4.0 * EPSILON
 
 
 @inlined
@@ -150,15 +157,12 @@ def _margins(
 ) -> None:
     """How far the point has to stay within each strip ``|P_i (x − c)| ≤ 1``: what rounding may cost, and ``least``."""
     n = c.size
-    largest = 0.0
-    for i in range(n):
-        largest = max(largest, residual[i])
     for i in range(n):
         lost = 0.0
         for j in range(n):
             far = max(upper[j] - c[j], c[j] - lower[j], 0.0)
             lost += abs(P[i, j]) * (gamma(2 * n + 8) * far + EPSILON * max(abs(lower[j]), abs(upper[j])))
-        margin[i] = min(least + 2.0 * (lost + largest) + 16.0 * EPSILON, MAX_MARGIN)
+        margin[i] = min(least + 2.0 * (lost + 2.0 * residual[i]) + 16.0 * EPSILON, MAX_MARGIN)
 
 
 @inner
