@@ -63,8 +63,13 @@ class TruncatedKalman(Kalman):
     def point(self) -> Vector:
         """Mean (n,) of the truncated density; a later coordinate's truncation may move an earlier one, so it is met
         with the domain once more."""
-        point = np.clip(self._held.mean, self._lower, self._upper)
-        return point if self._point_rule == "centre" else np.clip(point, *self.bounds())
+        lower, upper = self._lower, self._upper
+        if self._point_rule != "centre":
+            low, high = self.bounds()
+            low, high = np.maximum(low, lower), np.minimum(high, upper)
+            meets = low <= high  # before the truncation the box may miss the domain
+            lower, upper = np.where(meets, low, lower), np.where(meets, high, upper)
+        return np.clip(self._held.mean, lower, upper)
 
     def update(
         self,

@@ -59,13 +59,13 @@ def nearest_to_center(support: ConstrainedZonotope, lower: Vector, upper: Vector
 
 def settled(support: Support, point: Vector, lower: Vector, upper: Vector) -> Vector:
     """The point (n,), moved into the box, and as far into the set as is needed for it not to be proved outside."""
-    point = np.asarray(np.clip(point, lower, upper))
+    point = np.clip(point, lower, upper)
     if support.contains(point):
         return point
     c, G, A, b = support.to_constrained_zonotope().arrays
     deep = np.clip(c + G @ safe_maxima(np.vstack([G, -G]), A, b).points.mean(axis=0), lower, upper)
     for share in STEPS:
-        nearer = np.clip(point + share * (deep - point), lower, upper)
+        nearer: Vector = np.clip(point + share * (deep - point), lower, upper)
         if support.contains(nearer):
             return nearer
     return point
@@ -86,21 +86,26 @@ def _by_program(body: ConstrainedZonotope, target: Vector, lower: Vector, upper:
     """The nearest point; with shortened generators where that leaves a set.
 
     Variables are ξ, the distances ``p_i, n_i ≥ 0`` upwards and downwards in units of q_i, the largest of them t, and
-    its slacks: ``(c + G ξ − m)_i / q_i = p_i − n_i``, ``p_i + n_i + s_i = t``, all scaled to [−1, 1].
+    its slacks: ``(c + G ξ − m)_i / q_i = p_i − n_i``, ``p_i + n_i + s_i = t``, all scaled to [−1, 1]. A coordinate
+    whose box has no width is ``c_i + G_i ξ = m_i``.
     """
     c, G, A, b = body.arrays
     q = 0.5 * upper - 0.5 * lower
-    wide = np.flatnonzero(q > 0.0)
+    radius = zonotope_radius(G)
+    wide, fixed = np.flatnonzero(q > 0.0), np.flatnonzero((q == 0.0) & (radius > 0.0))
     up, down = (upper - target)[wide] / q[wide], (target - lower)[wide] / q[wide]
-    (m, g), k = A.shape, wide.size
+    g, k = A.shape[1], wide.size
+    own = np.vstack([A, G[fixed] / radius[fixed, None], G[wide] / q[wide, None]])
+    m = len(own) - k
     rows = np.zeros((m + 2 * k, g + 3 * k + 1))
-    rows[:m, :g], rows[m : m + k, :g] = A, G[wide] / q[wide, None]
+    rows[: m + k, :g] = own
     one = np.arange(k)
     p, n, t, s = g + one, g + k + one, g + 2 * k, g + 2 * k + 1 + one
     rows[m + one, p], rows[m + one, n] = -0.5 * up, 0.5 * down
     rows[m + k + one, p], rows[m + k + one, n], rows[m + k + one, s] = 0.5 * up, 0.5 * down, 1.0
     rows[m + k :, t] = -1.0
-    sides = np.concatenate([b, (target - c)[wide] / q[wide] + 0.5 * up - 0.5 * down, -0.5 * (up + down)])
+    distance = (target - c)[wide] / q[wide] + 0.5 * up - 0.5 * down
+    sides = np.concatenate([b, (target - c)[fixed] / radius[fixed], distance, -0.5 * (up + down)])
     objective = np.zeros((1, rows.shape[1]))
     objective[0, t], objective[0, p], objective[0, n] = -1.0, -SUM_WEIGHT * up, -SUM_WEIGHT * down
     for share in (1.0 - INSIDE, 1.0):
@@ -108,5 +113,5 @@ def _by_program(body: ConstrainedZonotope, target: Vector, lower: Vector, upper:
         shortened[: m + k, :g] *= share
         found = safe_maxima(objective, shortened, sides)
         if not found.empty:
-            return c + G @ (share * found.points[0, :g])
+            return np.asarray(c + G @ (share * found.points[0, :g]))
     return target

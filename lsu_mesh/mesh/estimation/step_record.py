@@ -63,7 +63,7 @@ class Combined:
 
 
 def published_content(posterior: Posterior) -> tuple[object, ...]:
-    """What makes a step worth telling again when it changes: the set, the density beside it, its worth, who is not in it.
+    """What makes a step worth telling again when it changes: the set, its density and its worth, and who is not in it.
 
     Later sets name the published one as their base, so they must descend from what it says.
     """
