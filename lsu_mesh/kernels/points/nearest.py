@@ -106,18 +106,18 @@ def _prepare(
 
 @inlined
 def _row_is_zero(T: Matrix, i: int) -> bool:
-    largest = 0.0
+    total = 0.0
     for j in range(T.shape[1]):
-        largest = max(largest, abs(T[i, j]))
-    return largest == 0.0
+        total += abs(T[i, j])
+    return total == 0.0
 
 
 @inlined
 def _column_is_zero(T: Matrix, j: int) -> bool:
-    largest = 0.0
+    total = 0.0
     for i in range(T.shape[0]):
-        largest = max(largest, abs(T[i, j]))
-    return largest == 0.0
+        total += abs(T[i, j])
+    return total == 0.0
 
 
 @inner
