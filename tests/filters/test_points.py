@@ -1,4 +1,4 @@
-"""Points: in the set by every rule but the centre, near the mean of all that is known, the same however they are made."""
+"""Points: in the set by every rule but the centre, near the mean of all that is known, the same by every way."""
 
 from __future__ import annotations
 
