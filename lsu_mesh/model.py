@@ -131,6 +131,8 @@ class LSUModel:
         """Whether ``y = C x + v``: no feedthrough, offset or period."""
         self.flow: ContinuousModel | None = None
         """Of a discretised model: the continuous one."""
+        self.length_ns: int | None = None
+        """Of a discretised model: the length of its stretch in nanoseconds."""
         if problems:
             raise ModelError(*problems)
 
@@ -194,7 +196,7 @@ class LSUModel:
             arguments["radii"] = None
         model = LSUModel(**{**arguments, **changes})  # type: ignore[arg-type]
         if not {*dynamics, "rho", "noise_map", "radii"} & set(changes):
-            model.flow, model.noise_share = self._flow_of(changes), self.noise_share
+            model.flow, model.noise_share, model.length_ns = self._flow_of(changes), self.noise_share, self.length_ns
         return model
 
     def _flow_of(self, changes: dict[str, object]) -> ContinuousModel | None:
@@ -288,7 +290,7 @@ class ContinuousModel:
         if rates.a is not None:
             step.a, a_radius = read_only(np.array(B[:, p])), np.array(B_radius[:, p])
         step.radii = Radii(read_only(A_radius), read_only(np.ascontiguousarray(B_radius[:, :p])), read_only(a_radius))
-        step.flow = self
+        step.flow, step.length_ns = self, h_ns
         return step
 
     def __repr__(self) -> str:

@@ -27,7 +27,9 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.kernels": [
         ("runtime",),
         ("linear_programs", "parallelotopes", "zonotopes", "discretisation", "plain_outputs"),
+        ("points",),
         ("filter_step", "plant_step"),
+        ("filter_point",),
         ("batch_run",),
     ],
     "lsu_mesh.kernels.runtime": [("compile", "unowned_views"), (REST,)],
@@ -42,6 +44,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("box", "parallelotope"),
         ("bundle",),
     ],
+    "lsu_mesh.kernels.points": [("normal", "room"), (REST,), ("stretch_noise",)],
     "lsu_mesh.kernels.zonotopes": [
         ("zonotope", "lifted_zonotope"),
         ("constrained_zonotope", "constraint_elimination", "generator_reduction", "time_update", "parallel_generators"),
@@ -53,9 +56,13 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("reduction",),
         (REST,),
         ("intersection",),
+        ("nearest_point",),
     ],
     "lsu_mesh.filters": [
-        ("filter", "validation", "inconsistency", "last_met", "transfer_gain", "plain_outputs"),
+        ("point_rule",),
+        ("validation",),
+        ("density",),
+        ("filter", "inconsistency", "last_met", "transfer_gain", "plain_outputs"),
         ("lagged_states",),
         ("compiled", "constrained_intersection", "constrained_state", "window"),
         (REST,),
@@ -68,7 +75,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("state",),
         ("batch_map", "window_map"),
     ],
-    "lsu_mesh.fusion": [("intersection",), (REST,), ("policies",), ("fuse",)],
+    "lsu_mesh.fusion": [("intersection", "point"), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
         ("message_examples", "sets", "data_files"),

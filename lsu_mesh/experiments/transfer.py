@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 
 
 KINDS: Mapping[str, Make] = {
-    "LSUO lp": lambda model, prior: LSUO(model, prior, hull="lp"),
-    "LSUP": lambda model, prior: LSUP(model, prior),
-    "LSUPB": lambda model, prior: LSUPB(model, prior),
-    "LSUCZ": lambda model, prior: LSUCZ(model, prior),
+    "LSUO lp": lambda model, prior: LSUO(model, prior, hull="lp", point="centre"),
+    "LSUP": lambda model, prior: LSUP(model, prior, point="centre"),
+    "LSUPB": lambda model, prior: LSUPB(model, prior, point="centre"),
+    "LSUCZ": lambda model, prior: LSUCZ(model, prior, point="centre"),
 }
 """LSUO with exact hulls is monotone: who starts with less knows less wide bounds at *every* step."""
 SYSTEMS: Mapping[str, tuple[str, ...]] = {"S2": ("LSUPB", "LSUCZ"), "P3": tuple(KINDS)}

@@ -13,9 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from lsu_mesh.array_types import Flags, Matrix, Stack
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.density import Density, noise_covariance
 from lsu_mesh.filters.run_record import FilterRun
 from lsu_mesh.filters.validation import checked_prior, kernel_model, numbers, with_offset
 from lsu_mesh.kernels import batch_run
+from lsu_mesh.kernels.points.room import room
 from lsu_mesh.kernels.runtime.scratch import scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.support import Support
@@ -65,9 +67,13 @@ class FilterBank:
         self._filter = first
         self._model = model_list[0]
         self._models = _stack(model_list)
-        self._states = np.array([first._start(checked_prior(model_list[0], prior)) for prior in prior_list])
+        self._states, self._estimates = _started(first, [checked_prior(model_list[0], prior) for prior in prior_list])
         if len(self._states) != count:
-            self._states = np.repeat(self._states, count, axis=0)
+            self._states, means, covariances = (
+                np.repeat(stack, count, axis=0)
+                for stack in (self._states, self._estimates.means, self._estimates.covariances)
+            )
+            self._estimates = self._estimates._replace(means=means, covariances=covariances)
         self._threads = max(1, min(threads or os.cpu_count() or 1, count // MIN_SHARE))
 
     def __len__(self) -> int:
@@ -77,7 +83,8 @@ class FilterBank:
     @property
     def points(self) -> Matrix:
         """Point estimates (N, n)."""
-        return np.array([self._filter._describe(state)[0] for state in self._states])
+        densities = map(Density, self._estimates.means, self._estimates.covariances)
+        return np.array([self._filter._located(*one) for one in zip(self._states, densities, strict=True)])
 
     def bounds(self) -> tuple[Matrix, Matrix]:
         """Interval hulls ``(lower, upper)``, each (N, n)."""
@@ -107,11 +114,18 @@ class FilterBank:
         return np.equal(outcome[:, 1], batch_run.DONE)
 
     def run(
-        self, Y: ArrayLike, U: ArrayLike | None = None, *, times: object = None, models: object = None
+        self,
+        Y: ArrayLike,
+        U: ArrayLike | None = None,
+        *,
+        times: object = None,
+        models: object = None,
+        points: bool = True,
     ) -> tuple[FilterRun, NDArray[np.int64]]:
         """All rows of Y (N, T, m), NaN or masked where missing, with inputs U (N, T, p).
 
         Returns the record, with a leading axis N, and the rows done (N,).
+        Without ``points`` those of states and outputs are not computed, and are NaN.
         An instance with fewer rows done than T met a contradiction there; its further rows are NaN. Times of the rows
         and models of one row each are refused: :func:`lsu_mesh.run_filter` takes them.
         """
@@ -130,7 +144,9 @@ class FilterBank:
         if inputs.shape != (*outputs.shape[:2], p):
             raise ModelError(f"U must have shape {(*outputs.shape[:2], p)}, it has shape {inputs.shape}")
         _check_finite(inputs[:, :-1])
-        record, outcome = self._sweep(outputs, inputs, updating=True, last_prediction=False)
+        record, outcome = self._sweep(outputs, inputs, updating=True, last_prediction=False, points=points)
+        if not points:
+            record.points[:], record.y_points[:] = np.nan, np.nan
         return FilterRun(*record), outcome[:, 0]
 
     def _table(self, name: str, value: ArrayLike, columns: int) -> Matrix:
@@ -143,7 +159,7 @@ class FilterBank:
         return np.zeros((len(self), rows, self._model.input_count))
 
     def _sweep(
-        self, Y: Stack, U: Stack, updating: bool, last_prediction: bool
+        self, Y: Stack, U: Stack, updating: bool, last_prediction: bool, points: bool = False
     ) -> tuple[batch_run.Record, NDArray[np.int64]]:
         record = _record(len(self), Y.shape[1] if updating else 0, self._states.shape[2], Y.shape[2])
         outcome = np.zeros((len(self), 2), dtype=np.int64)
@@ -153,7 +169,8 @@ class FilterBank:
             batch_run.sweep(
                 self._filter.family, self._filter.option, updating, last_prediction, self._states,
                 np.empty_like(self._states[0]), self._models, Y, inputs, record, outcome, first, last,
-                scratch(self._states.shape[2], self._models.G.shape[2]),
+                scratch(self._states.shape[2], self._models.G.shape[2]), self._estimates, points,
+                room(self._states.shape[2]),
             )  # fmt: skip
 
         _in_shares(share, len(self), self._threads)
@@ -206,7 +223,18 @@ def _stack(models: Sequence[LSUModel]) -> batch_run.Models:
         widths=np.array([one.widths for one in arrays]),
         r=np.array([one.r for one in arrays]),
         domains=domains,
+        Q=np.array([noise_covariance(model, None) for model in models]),
     )
+
+
+def _started(first: CompiledFilter, priors: Sequence[Support]) -> tuple[Stack, batch_run.Estimates]:
+    """States and densities of filters that start from these priors, each like the first one."""
+    states, densities = [], []
+    for prior in priors:
+        first.reset(prior)
+        states.append(first.snapshot().state)
+        densities.append(first.density)
+    return np.array(states), first._estimates(densities)
 
 
 def _record(count: int, rows: int, n: int, m: int) -> batch_run.Record:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar, Literal, NamedTuple, cast, get_args
 
 import numpy as np
@@ -11,9 +12,11 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
+from lsu_mesh.filters.density import Density, Drive, PointEstimate, noise_covariance
 from lsu_mesh.filters.filter import Filter, GainOf, OutputPrediction
 from lsu_mesh.filters.inconsistency import known_to_last_bits, strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import MAX_SWEEPS, SETTLED, conditioned
 from lsu_mesh.filters.validation import (
     KernelModel,
@@ -24,7 +27,7 @@ from lsu_mesh.filters.validation import (
     step_arrays,
     with_offset,
 )
-from lsu_mesh.kernels import batch_run, filter_step
+from lsu_mesh.kernels import batch_run, filter_point, filter_step
 from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -41,10 +44,11 @@ def ties_option(ties: Ties) -> int:
     return filter_step.TIES if ties == "new" else 0
 
 
-class Held(NamedTuple):
-    """A state, and the set that was met last where the state is what came of it."""
+class Snapshot(NamedTuple):
+    """A state, the density beside it, and the set that was met last where the state is what came of it."""
 
     state: Matrix
+    density: Density | None
     met: Support | None
 
 
@@ -58,15 +62,24 @@ class CompiledFilter(Filter):
     family: ClassVar[int]
     conditioning: ClassVar[int] = 2
     option: int
-    _met: Held | None = None
-    """The set that was met last, and the state that came of it."""
+    _met: tuple[Matrix, Support] | None = None
+    """The set that was met last, with the state that came of it."""
+    _density: Density | None
+    _state: Matrix
 
-    def __init__(self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], option: int) -> None:
+    def __init__(
+        self,
+        model: LSUModel,
+        prior: Support | tuple[ArrayLike, ArrayLike],
+        option: int,
+        point: PointOption = "mean",
+    ) -> None:
         self.option = option
         self._model = model
         self._arrays = kernel_model(model)
+        self._estimate = PointEstimate(model, point)
         self._work = self._scratch(self._arrays.G.shape[1])
-        self._state = self._start(checked_prior(model, prior))
+        self.reset(checked_prior(model, prior))
 
     @staticmethod
     @abstractmethod
@@ -92,7 +105,15 @@ class CompiledFilter(Filter):
 
     @property
     def point(self) -> Vector:
-        return self._describe(self._state)[0]
+        return self._located(self._state, self._density)
+
+    @property
+    def point_rule(self) -> PointRule:
+        return self._estimate.rule
+
+    @property
+    def density(self) -> Density | None:
+        return self._density
 
     def bounds(self) -> tuple[Vector, Vector]:
         _, lower, upper, _ = self._describe(self._state)
@@ -103,7 +124,10 @@ class CompiledFilter(Filter):
 
     def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
         used, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
-        return shifted(self._predict_output(arrays.C, arrays.r), used, u)
+        interval = self._predict_output(arrays.C, arrays.r)
+        if self._estimate.rule != "centre":
+            interval = interval._replace(point=self._output_point(arrays.C))
+        return shifted(interval, used, u)
 
     def update(
         self,
@@ -124,6 +148,7 @@ class CompiledFilter(Filter):
         if status > 0:
             raise self._contradiction(used, arrays.C, *strips, status)
         self._accept(state, status)
+        self._density = self._estimate.updated(self._density, arrays, strips[0], widths=strips[1], bounds=self.bounds)
         return self.support
 
     def predict(
@@ -148,6 +173,8 @@ class CompiledFilter(Filter):
                 name = self._model.states[status - 1]
                 raise InconsistentData(f"the prediction misses the domain in state {name}")
         self._accept(state, status)
+        drive = Drive(center, widths, has_rho=rho is not None)
+        self._density = self._estimate.predicted(self._density, step_model, arrays, drive, bounds=self.bounds)
         return self.support
 
     def condition(self, support: Support, gain: GainOf | None = "support") -> float:
@@ -190,37 +217,49 @@ class CompiledFilter(Filter):
         An equal state that came of something else, as of a time update of a state at rest, does not count: replay would
         have to know of it.
         """
-        return self._met.met if self._met is not None and self._met.state is self._state else None
+        return self._met[1] if self._met is not None and self._met[0] is self._state else None
 
     @last_met.setter
     def last_met(self, support: Support) -> None:
-        self._met = Held(self._state, support)
+        self._met = (self._state, support)
 
     def reset(self, support: Support) -> None:
         self._state = self._start(checked_prior(self._model, support))
+        self._density = self._estimate.started(*self.bounds())
+
+    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
+        self._state = self._continued(checked_prior(self._model, support), lower, upper)
+        self._density = self._estimate.started(lower, upper)
+
+    def take_density(self, density: Density) -> None:
+        self._density = self._estimate.resumed(density)
+
+    def _continued(self, support: Support, lower: Vector, upper: Vector) -> Matrix:
+        """The state that published this support and these bounds."""
+        return self._start(support)
 
     @property
     def is_resumable(self) -> bool:
         """Support and bounds tell the whole state."""
         return True
 
-    def snapshot(self) -> object:
-        return Held(self._state, self.last_met)
+    def snapshot(self) -> Snapshot:
+        return Snapshot(self._state, self._density, self.last_met)
 
     def restore(self, snapshot: object) -> None:
-        held = cast("Held", snapshot)
-        self._state, self._met = held.state, None if held.met is None else held
+        self._state, self._density, met = cast("Snapshot", snapshot)
+        self._met = None if met is None else (self._state, met)
 
     @property
     def has_compiled_loop(self) -> bool:
         """Whether :meth:`sweep` does what the steps one by one do: not where a step must look at its set."""
         return self._model.has_plain_outputs and self._model.radii is None
 
-    def sweep(self, Y: Matrix, U: Matrix, record: batch_run.Record) -> tuple[int, int]:
+    def sweep(self, Y: Matrix, U: Matrix, record: batch_run.Record, points: bool = True) -> tuple[int, int]:
         """Update and predict for all rows of Y (T, m), U (T, p) in a compiled loop; ``record`` has a leading axis 1.
 
         Returns the rows that are done, and where it stopped (``kernels/batch_run.py``); the filter holds the last good
-        state.
+        state. Without ``points`` those of the record are left as they are.
         """
         a = self._arrays
         domain = self._model.domain
@@ -232,14 +271,30 @@ class CompiledFilter(Filter):
             widths=a.widths[np.newaxis],
             r=a.r[np.newaxis],
             domains=np.zeros((1, 0, len(a.A))) if domain is None else np.array([domain.bounds()]),
+            Q=noise_covariance(self._model, None)[np.newaxis],
         )
         states, outcome = self._state[np.newaxis].copy(), np.zeros((1, 2), dtype=np.int64)
+        estimates = self._estimates([self._density])
         batch_run.sweep(
             self.family, self.option, True, False, states, np.empty_like(self._state), models,
             Y[np.newaxis], with_offset(self._model, U)[np.newaxis], record, outcome, 0, 1, self._work,
+            estimates, points, self._estimate.room,
         )  # fmt: skip
         self._state = states[0]
+        if self._density is not None:
+            self._density = Density(estimates.means[0], estimates.covariances[0])
         return int(outcome[0, 0]), int(outcome[0, 1])
+
+    def _estimates(self, densities: Sequence[Density | None]) -> batch_run.Estimates:
+        """The rule and copies of the densities, as the compiled loop writes them."""
+        n = self._model.state_count
+        blank = Density(np.zeros(n), np.zeros((n, n)))
+        held = [blank if density is None else density for density in densities]
+        return batch_run.Estimates(
+            rule=self._estimate.code,
+            means=np.array([density.mean for density in held]),
+            covariances=np.array([density.covariance for density in held]),
+        )
 
     def _of_step(self, model: LSUModel) -> tuple[LSUModel, KernelModel]:
         return same_states(self._model, model), step_arrays(model)
@@ -270,6 +325,22 @@ class CompiledFilter(Filter):
         n = self._model.state_count
         point, lower, upper = np.empty(n), np.empty(n), np.empty(n)
         return point, lower, upper, filter_step.describe(self.family, state, point, lower, upper, self._work)
+
+    def _located(self, state: Matrix, density: Density | None) -> Vector:
+        """The point of a state by the rule."""
+        point, lower, upper, _ = self._describe(state)
+        rule, (mean, P) = self._estimate.code, self._estimates([density])[1:]
+        filter_point.locate(self.family, rule, state, mean[0], P[0], lower, upper, point, self._estimate.room)
+        return point
+
+    def _output_point(self, C: Matrix) -> Vector:
+        """``C x`` of the point x, as the compiled loop computes it."""
+        point, y = np.empty(self._model.state_count), np.empty(len(C))
+        rule, (mean, P) = self._estimate.code, self._estimates([self._density])[1:]
+        filter_point.locate_output(
+            self.family, rule, self._state, mean[0], P[0], C, point, y, self._work, self._estimate.room
+        )
+        return y
 
     def _log_volume(self, state: Matrix) -> float:
         return filter_step.log_volume(self.family, state, self._work)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
+from lsu_mesh.filters.density import Density
 from lsu_mesh.filters.lagged_states import body_of, with_newest
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
@@ -29,6 +30,8 @@ class Held(NamedTuple):
     upper: Vector
     is_hull: bool
     """Whether the box is the meet with the interval hull of the set already."""
+    density: Density | None = None
+    """Beside the set, for the point estimate; ``None`` in a set on the way: it then keeps the one in force."""
     met: Support | None = None
     """The set that was met last, where nothing has come since."""
 

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Vector
+from lsu_mesh.filters.density import Density
+from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -77,7 +79,20 @@ class Filter(ABC):
     @property
     @abstractmethod
     def point(self) -> Vector:
-        """Point estimate (n,) of the state now."""
+        """Point estimate (n,) of the state now, by the :attr:`point_rule`."""
+
+    @property
+    def point_rule(self) -> PointRule:
+        """``"mean"`` and ``"nearest"``: :attr:`point` is never proved to lie outside of :attr:`support` or bounds.
+
+        ``"centre"``: it may, as the centre of a hull may; what a class says that promises nothing.
+        """
+        return "centre"
+
+    @property
+    def density(self) -> Density | None:
+        """Mean and covariance beside the set that the point estimate is taken from; ``None`` where there are none."""
+        return None
 
     @abstractmethod
     def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
@@ -148,9 +163,13 @@ class Filter(ABC):
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Continue from what a filter of this class published: its :attr:`support` and its :meth:`bounds` (n,), (n,).
 
-        The later sets are those of that filter, bit by bit, if :attr:`is_resumable`.
+        The later sets are those of that filter, bit by bit, if :attr:`is_resumable`; the later points are with its
+        density, see :meth:`take_density`.
         """
         self.reset(support)
+
+    def take_density(self, density: Density) -> None:  # noqa: B027  a filter without a density has nothing to take
+        """After :meth:`resume` or :meth:`reset`: go on from this :attr:`density`, where the filter has one at all."""
 
     @property
     def is_resumable(self) -> bool:

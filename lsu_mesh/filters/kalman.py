@@ -12,6 +12,7 @@ from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule, point_rule
 from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box
@@ -44,6 +45,8 @@ class Kalman(Filter):
         gives mean and variance of x_1.
     sigmas:
         The published box is ``x̂ ± sigmas · √diag P``. It is *no* guaranteed bound.
+    point:
+        The rule of the point estimate, of any of which the mean is the point: it is the centre of the box.
 
     Raises
     ------
@@ -64,13 +67,18 @@ class Kalman(Filter):
     """What was transferred, carried on; ``None``: nothing was."""
 
     def __init__(
-        self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], sigmas: float = 3.0
-    ) -> None:  # fmt: skip
+        self,
+        model: LSUModel,
+        prior: Support | tuple[ArrayLike, ArrayLike],
+        sigmas: float = 3.0,
+        point: PointOption = "mean",
+    ) -> None:
         if not (np.isfinite(sigmas) and sigmas > 0):
             raise ModelError(f"sigmas must be a number > 0, it is {sigmas}")
         self._model = model
         self._arrays = kernel_model(model)
         self._sigmas = sigmas
+        self._point_rule = point_rule(point)
         self.reset(checked_prior(model, prior))
 
     @property
@@ -87,6 +95,11 @@ class Kalman(Filter):
     def point(self) -> Vector:
         """Mean (n,), moved into what was transferred."""
         return _within(self._held.mean, self._box)
+
+    @property
+    def point_rule(self) -> PointRule:
+        """The rule of :attr:`point`."""
+        return self._point_rule
 
     @property
     def covariance(self) -> Matrix:

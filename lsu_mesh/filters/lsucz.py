@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +12,12 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
 from lsu_mesh.filters.constrained_intersection import joined
 from lsu_mesh.filters.constrained_state import Held, log_size, within
+from lsu_mesh.filters.density import Density, Drive, PointEstimate
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.lagged_states import body_of, rows_of, stacked_step, with_newest
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.parallelotopes.box import keep_constants
@@ -24,6 +26,7 @@ from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constra
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.arrays import box_volume
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
+from lsu_mesh.supports.nearest_point import nearest_point, nearest_to_center
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.reduction import Body, Limits, settle
 from lsu_mesh.supports.support import Support
@@ -50,8 +53,9 @@ class LSUCZ(Filter):
         ``max(20, 3 n)``; as many constraints, ``None`` is no limit. A prediction has up to one generator per noise and
         state more, until the next data update.
     point:
-        ``"hull"``: centre of the interval hull (Method 1); ``"nearest"``: the point of the support that is nearest to
-        the centre of its generators' box (Method 2).
+        The point estimate: ``"mean"``: of the truncated density beside the set, moved into it; ``"nearest"``: the point
+        of the support that is nearest to the centre of its generators' box (Method 2); ``"centre"``: that of the
+        interval hull (Method 1), which may lie outside.
     reduce:
         ``False``: no limit of either kind, the set grows with every step.
     lag:
@@ -86,7 +90,7 @@ class LSUCZ(Filter):
         prior: Support | tuple[ArrayLike, ArrayLike],
         max_generators: int | None = None,
         max_constraints: int | None = 8,
-        point: Literal["hull", "nearest"] = "hull",
+        point: PointOption = "mean",
         reduce: bool = True,
         lag: int = 0,
     ) -> None:
@@ -94,8 +98,6 @@ class LSUCZ(Filter):
         if lag < 0:
             raise ModelError(f"lag must not be negative, it is {lag}")
         least = n * (lag + 1)
-        if point not in ("hull", "nearest"):
-            raise ModelError(f'point must be "hull" or "nearest", it is {point!r}')
         if max_generators is not None and max_generators < least:
             number = "the number of states" if not lag else f"the states of {lag + 1} steps"
             raise ModelError(f"max_generators must be at least {least}, {number}, it is {max_generators}")
@@ -106,7 +108,7 @@ class LSUCZ(Filter):
         if max_generators is None:
             max_generators = max(GENERATORS, GENERATORS_PER_STATE * n) + n * lag
         self._limits = Limits(max_generators, max_constraints) if reduce else Limits(None, None)
-        self._point_rule = point
+        self._estimate = PointEstimate(model, point)
         self._lag = lag
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
@@ -145,9 +147,22 @@ class LSUCZ(Filter):
     def point(self) -> Vector:
         """Point estimate (n,) by the rule ``point``."""
         lower, upper = self.bounds()
-        if self._point_rule == "hull":
+        if self._estimate.rule == "centre":
             return 0.5 * lower + 0.5 * upper
-        return np.clip(self.support.nearest_to_center(), lower, upper)
+        if self._estimate.rule == "nearest":
+            return nearest_to_center(self.support, lower, upper)
+        target = self._estimate.target(self._held.density, lower, upper, lambda: 0.5 * lower + 0.5 * upper)
+        return nearest_point(self.support, target, lower, upper)
+
+    @property
+    def point_rule(self) -> PointRule:
+        """The rule of :attr:`point`."""
+        return self._estimate.rule
+
+    @property
+    def density(self) -> Density | None:
+        """Mean and covariance beside the set, of the rule ``"mean"``."""
+        return self._held.density
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull of the support met with the box that is held beside it; (n,), (n,)."""
@@ -184,9 +199,12 @@ class LSUCZ(Filter):
         C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r=r, u=u, image=self._image)
         if not np.isnan(values).all():
             try:
-                self._cut(rows_of(C, 0, self._depth), values, widths)
+                held = self._cut(rows_of(C, 0, self._depth), values, widths)
             except InconsistentData as contradiction:
                 raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
+            density = self._held.density
+            self._hold(held)
+            self._hold_density(self._estimate.updated(density, arrays, values, widths=widths, bounds=self.bounds))
         return self.support
 
     def update_late(
@@ -199,7 +217,8 @@ class LSUCZ(Filter):
     ) -> ConstrainedZonotope:
         """Data update with y (m,) of ``steps`` steps ago, within the lag; r, model and u are those of that step.
 
-        Without reduction the sets are those that the data give in order. Raises as :meth:`update` and :meth:`smoothed`.
+        Without reduction the sets are those that the data give in order. The density beside the set, from which the
+        point comes, takes nothing from late data. Raises as :meth:`update` and :meth:`smoothed`.
         """
         used, place = same_states(self._model, model), self._place(steps)
         arrays = self._arrays if model is None else step_arrays(used)
@@ -207,7 +226,7 @@ class LSUCZ(Filter):
         values, widths = plain_strips(used, arrays, y, r=r, u=u, image=image)
         if not np.isnan(values).all():
             try:
-                self._cut(rows_of(arrays.C, place, self._depth), values, widths)
+                self._hold(self._cut(rows_of(arrays.C, place, self._depth), values, widths))
             except InconsistentData as contradiction:
                 raise strip_contradiction(used.outputs, *image(arrays.C), values, widths) from contradiction
         return self.support
@@ -232,8 +251,11 @@ class LSUCZ(Filter):
         keep_constants(box[0, :n], box[1, :n], arrays.A, arrays.B, center, arrays.G, widths, lower[:n], upper[:n])
         if not finite:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
-        held = Held(body, lower, upper, is_hull=False)
+        density, held = self._held.density, Held(body, lower, upper, is_hull=False)
         self._hold(held if used.domain is None else within(held, used.domain))
+        if density is not None:
+            drive = Drive(center, widths, has_rho=rho is not None)
+            self._hold_density(self._estimate.predicted(density, used, arrays, drive, bounds=self.bounds))
         return self.support
 
     def condition(self, support: Support, gain: GainOf | None = "support") -> float:
@@ -279,12 +301,17 @@ class LSUCZ(Filter):
         given = checked_prior(self._model, support)
         body = given.to_constrained_zonotope().arrays
         lower, upper = given.bounds()
-        self._hold(Held(body, lower, upper, True) if self._limits.allow(body) else self._settled(body, lower, upper))
+        held = Held(body, lower, upper, True) if self._limits.allow(body) else self._settled(body, lower, upper)
+        self._hold(held._replace(density=self._estimate.started(lower, upper)))
 
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Go on from the set and the box as they are, bit by bit."""
         body = checked_prior(self._model, support).to_constrained_zonotope().arrays
-        self._hold(Held(body, lower, upper, is_hull=True))
+        self._hold(Held(body, lower, upper, True, self._estimate.started(lower, upper)))
+
+    def take_density(self, density: Density) -> None:
+        """Go on from this density, with the rule ``"mean"``."""
+        self._hold_density(self._estimate.resumed(density))
 
     @property
     def is_resumable(self) -> bool:
@@ -325,16 +352,23 @@ class LSUCZ(Filter):
             )
         return self._bounds
 
-    def _cut(self, P: Matrix, values: Vector, widths: Vector) -> None:
-        """Keep the part in the strips ``|values − P x| ≤ widths``, P (m, n depth), NaN for no strip."""
+    def _cut(self, P: Matrix, values: Vector, widths: Vector) -> Held:
+        """The part in the strips ``|values − P x| ≤ widths``, P (m, n depth), NaN for no strip."""
         c, G, A, b = self._held.body
         cut = (c, *meet_strips(c, G, A, b, P, values, widths))
-        self._hold(self._settled(cut, self._held.lower, self._held.upper))
+        return self._settled(cut, self._held.lower, self._held.upper)
 
     def _hold(self, held: Held) -> None:
-        self._held = held
+        """Hold a set, beside which the density in force stays where it brings none."""
+        own = getattr(self, "_held", held).density
+        self._held = held if held.density is not None or own is None else held._replace(density=own)
         self._support = None
         self._bounds = None
+
+    def _hold_density(self, density: Density | None) -> None:
+        """Another density beside the same set."""
+        if density is not None:
+            self._held = self._held._replace(density=density)
 
     def _settled(self, body: Body, lower: Vector, upper: Vector) -> Held:
         """Hull, then reduction; raises ``InconsistentData`` where the set is proved empty."""

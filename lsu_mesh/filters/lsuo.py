@@ -11,6 +11,7 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter, Ties, ties_option
 from lsu_mesh.filters.filter import Guarantee
+from lsu_mesh.filters.point_rule import PointOption
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -19,8 +20,6 @@ from lsu_mesh.supports.support import Support
 
 class LSUO(CompiledFilter):
     """Box filter: ``c⁺ = A c + B u``, ``q⁺ = |A| q + |N| rho``; data strips, interval hull, meet with the prediction.
-
-    The point estimate is the centre of the box (eq. 14).
 
     Parameters
     ----------
@@ -37,6 +36,9 @@ class LSUO(CompiledFilter):
     ties:
         A strip that cuts one face only leaves two parallelotopes of equal volume: ``"old"`` keeps the old edges,
         ``"new"`` takes the strip, which is nearer to Table 1 of the paper.
+    point:
+        The point estimate: ``"mean"``: of the density beside the box, truncated at it; ``"nearest"`` and ``"centre"``:
+        the centre of the box (eq. 14).
 
     Raises ``ModelError`` on options or a prior that do not fit.
     Source: Pavelková & Jirsa 2018, eqs. (8)–(14); Lainová et al. 2019, section 3.1.
@@ -54,10 +56,11 @@ class LSUO(CompiledFilter):
         meet: bool = True,
         hull: Literal["strips", "lp"] = "strips",
         ties: Ties = "old",
+        point: PointOption = "mean",
     ) -> None:
         if hull not in ("strips", "lp"):
             raise ModelError(f'hull must be "strips" or "lp", not {hull!r}')
-        super().__init__(model, prior, option=(filter_step.MEET if meet else 0) | ties_option(ties))
+        super().__init__(model, prior, option=(filter_step.MEET if meet else 0) | ties_option(ties), point=point)
         self.ties = ties
         self.meet = bool(meet)
         self.hull = hull

@@ -11,7 +11,7 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.compiled import CompiledFilter, Ties, ties_option
 from lsu_mesh.filters.filter import Guarantee
-from lsu_mesh.filters.validation import checked_prior
+from lsu_mesh.filters.point_rule import PointOption
 from lsu_mesh.kernels import filter_step
 from lsu_mesh.kernels.parallelotopes import parallelotope
 from lsu_mesh.model import LSUModel
@@ -35,8 +35,6 @@ ROUNDING = 1e-12
 class LSUP(CompiledFilter):
     """Parallelotope filter: strips of the data (Vicino, Zappa), and a parallelotope around ``A P + B u + N box(rho)``.
 
-    The point estimate is the centre of the parallelotope (eq. 35).
-
     Parameters
     ----------
     model:
@@ -56,6 +54,10 @@ class LSUP(CompiledFilter):
     ties:
         A strip of data that cuts one face only leaves two parallelotopes of equal volume: ``"old"`` keeps the old
         edges, ``"new"`` takes the strip.
+    point:
+        The point estimate: ``"mean"``: of the truncated density beside the set, moved into it and into the box;
+        ``"nearest"``: the point of both that is nearest to the parallelotope's centre; ``"centre"``: that centre
+        (eq. 35), moved into the box, which may then lie outside of the parallelotope.
 
     Raises ``ModelError`` on options or a prior that do not fit.
 
@@ -78,6 +80,7 @@ class LSUP(CompiledFilter):
         time_update: TimeUpdate = "image",
         box: bool = True,
         ties: Ties = "old",
+        point: PointOption = "mean",
     ) -> None:
         if time_update not in TIME_UPDATES:
             raise ModelError(f"time_update must be one of {', '.join(TIME_UPDATES)}, not {time_update!r}")
@@ -88,7 +91,7 @@ class LSUP(CompiledFilter):
                 f'the model has {n} and {q}: use "cgz" or "strips"'
             )
         self.has_box = bool(box)
-        super().__init__(model, prior, option=TIME_UPDATES[time_update] | ties_option(ties))
+        super().__init__(model, prior, option=TIME_UPDATES[time_update] | ties_option(ties), point=point)
         self.ties = ties
         self.time_update = time_update
 
@@ -110,10 +113,10 @@ class LSUP(CompiledFilter):
         self._state = self._beside(shortened, box)
         return max(0.0, volume - self._log_volume(shortened)) if volume > -np.inf else 0.0
 
-    def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
-        """Go on from the parallelotope, and from the box where one is carried, bit by bit."""
-        body = self._enclose(checked_prior(self._model, support))
-        self._state = np.vstack([body, lower, upper]) if self.has_box else body
+    def _continued(self, support: Support, lower: Vector, upper: Vector) -> Matrix:
+        """The parallelotope, and the box where one is carried, bit by bit."""
+        body = self._enclose(support)
+        return np.vstack([body, lower, upper]) if self.has_box else body
 
     def _start(self, support: Support) -> Matrix:
         body = self._enclose(support)

@@ -34,6 +34,7 @@ def run_filter(
     off_grid: OffGrid = "refuse",
     on_inconsistency: OnInconsistency = "raise",
     volumes: bool | None = None,
+    points: bool = True,
 ) -> FilterRun:
     """Update with ``Y[k]`` and predict with ``U[k]`` for every row; afterwards the filter holds the last posterior.
 
@@ -66,6 +67,8 @@ def run_filter(
     volumes:
         ``None``: ``run.volumes`` is computed when it is first read, from the sets of the rows, which are kept until
         then; ``True``: at once; ``False``: never, it is NaN, and no set is kept. (A compiled loop always has them.)
+    points:
+        ``False``: points of states and of outputs are not computed, and are NaN.
 
     Raises
     ------
@@ -82,6 +85,7 @@ def run_filter(
     needs_last = any((m.rates if isinstance(m, ContinuousModel) else m).D is not None for m in all_models)
     inputs = _inputs(U, len(outputs), filter.model.input_count, needs_last)
     run = blank_run(len(outputs), filter.model.state_count, filter.model.output_count, filter.guarantee)
+    run.has_points = points
     rule = RowRule(filter, run, on_inconsistency)
     try:
         if times is not None or models is not None:
@@ -107,6 +111,9 @@ def run_filter(
     except LsuMeshError as error:
         error.run = run.first(run.done)
         raise
+    finally:
+        if not points:  # a compiled loop has the centres, which cost it nothing
+            run.drop_points()
     return run.complete() if volumes else run
 
 
@@ -127,7 +134,7 @@ def _sweep(filter: CompiledFilter, Y: Matrix, U: Matrix, rule: RowRule, run: Fil
     run.status[:] = ["missing" if np.isnan(y).all() else "ok" for y in Y]
     while row < len(Y):
         record = batch_run.Record(*(table[np.newaxis, row:] for table in tables))
-        done, where = filter.sweep(Y[row:], U[row:], record)
+        done, where = filter.sweep(Y[row:], U[row:], record, run.has_points)
         row += done
         run.done = row
         if where == batch_run.IN_UPDATE:

@@ -51,6 +51,8 @@ class FilterRun(Tables):
     sets: list[object]
     """Snapshots of the filter after each row, as long as the volumes are not computed."""
     filter: Filter | None
+    has_points: bool = True
+    """Whether points are computed; else they are NaN."""
 
     @property
     def volumes(self) -> Vector:
@@ -75,6 +77,10 @@ class FilterRun(Tables):
         run.status, run.sets = self.status[:rows], self.sets[:rows]
         return run
 
+    def drop_points(self) -> None:
+        """No points of states and outputs."""
+        self.points[:], self.y_points[:] = np.nan, np.nan
+
     def complete(self) -> FilterRun:
         """This run with its volumes computed: each waiting set is seen through the filter that held it."""
         filter, sets = getattr(self, "filter", None), getattr(self, "sets", [])
@@ -95,9 +101,9 @@ class FilterRun(Tables):
 def blank_run(rows: int, n: int, m: int, guarantee: Guarantee) -> FilterRun:
     """A run of so many rows, to be filled."""
     run = FilterRun(
-        points=np.empty((rows, n)), lower=np.empty((rows, n)), upper=np.empty((rows, n)),
+        points=np.full((rows, n), np.nan), lower=np.empty((rows, n)), upper=np.empty((rows, n)),
         volumes=np.full(rows, np.nan),
-        y_lower=np.empty((rows, m)), y_upper=np.empty((rows, m)), y_points=np.empty((rows, m)),
+        y_lower=np.empty((rows, m)), y_upper=np.empty((rows, m)), y_points=np.full((rows, m), np.nan),
     )  # fmt: skip
     run.guarantee, run.status, run.done = guarantee, ["missing"] * rows, 0
     run.sets, run.filter = [], None
@@ -106,12 +112,15 @@ def blank_run(rows: int, n: int, m: int, guarantee: Guarantee) -> FilterRun:
 
 def store_output(run: FilterRun, row: int, predicted: OutputPrediction) -> None:
     """Store the output prediction of a row."""
-    run.y_lower[row], run.y_upper[row], run.y_points[row] = predicted
+    run.y_lower[row], run.y_upper[row] = predicted.lower, predicted.upper
+    if run.has_points:
+        run.y_points[row] = predicted.point
 
 
 def store_set(run: FilterRun, row: int, filter: Filter) -> None:
     """Store the posterior of a row; its volume is computed later, where ``run.filter`` is set."""
-    run.points[row] = filter.point
+    if run.has_points:
+        run.points[row] = filter.point
     run.lower[row], run.upper[row] = filter.bounds()
     if run.filter is not None:
         run.sets.append(filter.snapshot())

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.kalman import Box, Gaussian, Kalman
+from lsu_mesh.filters.point_rule import PointOption
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -29,6 +30,8 @@ class TruncatedKalman(Kalman):
         As for the Kalman filter; the model needs a domain.
     feedback:
         Whether the truncated density is what the next step starts from; else it is an output only.
+    point:
+        The rule of the point estimate: the mean, met with the domain; but for ``"centre"`` met with the box, too.
 
     Raises
     ------
@@ -48,18 +51,25 @@ class TruncatedKalman(Kalman):
         prior: Support | tuple[ArrayLike, ArrayLike],
         sigmas: float = 3.0,
         feedback: bool = True,
+        point: PointOption = "mean",
     ) -> None:
         if model.domain is None:
             raise ModelError("TruncatedKalman truncates at the model's domain; give the model one")
         self._lower, self._upper = model.domain.bounds()
         self._feedback = feedback
-        super().__init__(model, prior, sigmas)
+        super().__init__(model, prior, sigmas, point)
 
     @property
     def point(self) -> Vector:
         """Mean (n,) of the truncated density; a later coordinate's truncation may move an earlier one, so it is met
         with the domain once more, and with what was transferred."""
-        inside = np.clip(self._held.mean, self._lower, self._upper)
+        lower, upper = self._lower, self._upper
+        if self._point_rule != "centre":
+            low, high = self.bounds()
+            low, high = np.maximum(low, lower), np.minimum(high, upper)
+            meets = low <= high  # before the truncation the box may miss the domain
+            lower, upper = np.where(meets, low, lower), np.where(meets, high, upper)
+        inside = np.clip(self._held.mean, lower, upper)
         return inside if self._box is None else np.clip(inside, *self._box)
 
     def update(

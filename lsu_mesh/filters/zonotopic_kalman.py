@@ -9,9 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
+from lsu_mesh.filters.density import Density, Drive, PointEstimate
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import MAX_SWEEPS, SETTLED, conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
 from lsu_mesh.kernels.parallelotopes.box import keep_constants
@@ -22,6 +24,7 @@ from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
 from lsu_mesh.kernels.zonotopes.zonotopic_kalman import box_shortest, corrected, kalman_gain
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.linear_programs import is_proved_empty
+from lsu_mesh.supports.nearest_point import nearest_point
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 from lsu_mesh.supports.zonotope import Zonotope
@@ -46,6 +49,8 @@ class Held(NamedTuple):
     lower: Vector
     upper: Vector
     pending: Strips
+    density: Density | None = None
+    """Beside the set, for the point estimate."""
     met: Support | None = None
     """The set that was met last, where nothing has been brought to the zonotope since."""
 
@@ -73,6 +78,10 @@ class ZonotopicKalman(Filter):
         in the states' own units, as in the papers.
     reduce:
         ``False``: all columns are kept, the set grows with every step.
+    point:
+        The point estimate: ``"mean"``: of the truncated density beside the set, moved into it; ``"nearest"``: the point
+        of the set in the bounds that is nearest to the zonotope's centre; ``"centre"``: that centre, moved into the
+        bounds, which may then lie outside of the zonotope.
 
     Raises
     ------
@@ -99,6 +108,7 @@ class ZonotopicKalman(Filter):
         box: bool = True,
         scaled: bool = True,
         reduce: bool = True,
+        point: PointOption = "mean",
     ) -> None:
         if form not in ("filter", "predictor"):
             raise ModelError(f'form must be "filter" or "predictor", it is {form!r}')
@@ -111,6 +121,7 @@ class ZonotopicKalman(Filter):
         self._form = form
         self._has_box = bool(box)
         self._scaled = bool(scaled)
+        self._estimate = PointEstimate(model, point)
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
     @property
@@ -125,8 +136,20 @@ class ZonotopicKalman(Filter):
 
     @property
     def point(self) -> Vector:
-        """Centre of the zonotope (n,), moved into the bounds."""
-        return np.clip(self._held.c, *self.bounds())
+        """Point estimate (n,) by the rule ``point``."""
+        lower, upper = self.bounds()
+        target = self._estimate.target(self._held.density, lower, upper, lambda: np.clip(self._held.c, lower, upper))
+        return target if self._estimate.rule == "centre" else nearest_point(self.support, target, lower, upper)
+
+    @property
+    def point_rule(self) -> PointRule:
+        """The rule of :attr:`point`."""
+        return self._estimate.rule
+
+    @property
+    def density(self) -> Density | None:
+        """Mean and covariance beside the set, of the rule ``"mean"``."""
+        return self._held.density
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull of the zonotope, met with the box beside it; (n,), (n,)."""
@@ -169,6 +192,10 @@ class ZonotopicKalman(Filter):
                     self._held = self._held._replace(pending=Strips(*map(_stacked, waiting, strips)))
             except InconsistentData as contradiction:
                 raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
+            density = self._estimate.updated(
+                self._held.density, arrays, values, widths=widths, bounds=self.bounds
+            )  # fmt: skip
+            self._held = self._held._replace(density=density)
         return self.support
 
     def predict(
@@ -198,7 +225,10 @@ class ZonotopicKalman(Filter):
         held = Held(c=c, H=H, lower=lower, upper=upper, pending=_no_strips(c.size))
         if _is_contradictory(held):
             raise InconsistentData("the prediction is proved to miss the domain")
+        drive, density = Drive(center, widths, has_rho=rho is not None), self._held.density
         self._held = held
+        density = self._estimate.predicted(density, used, arrays, drive, bounds=self.bounds)
+        self._held = held._replace(density=density)
         return self.support
 
     def condition(self, support: Support, gain: GainOf | None = "support") -> float:
@@ -242,7 +272,7 @@ class ZonotopicKalman(Filter):
             body = given.interval_hull().to_constrained_zonotope()
         c, H, _, _ = body.arrays
         H = H if self._order is None else box_shortest(H, self._order, self._scaled)
-        self._held = Held(c, H, *given.bounds(), _no_strips(c.size))
+        self._held = Held(c, H, *given.bounds(), _no_strips(c.size), self._estimate.started(*given.bounds()))
 
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Go on from a zonotope and a box; in the predictor form data that wait have to be given again."""
@@ -254,7 +284,12 @@ class ZonotopicKalman(Filter):
             lower=lower,
             upper=upper,
             pending=_no_strips(lower.size),
+            density=self._estimate.started(lower, upper),
         )
+
+    def take_density(self, density: Density) -> None:
+        """Go on from this density, with the rule ``"mean"``."""
+        self._held = self._held._replace(density=self._estimate.resumed(density))
 
     @property
     def is_resumable(self) -> bool:

@@ -18,7 +18,8 @@ class Fusion(NamedTuple):
     """What the sources know together.
 
     ``support`` holds the state; ``bounds`` (lower, upper) is its interval hull met with the bounds of every accepted
-    source; ``point`` is the centre of the bounds; ``rejected`` are indices of sources that were left out.
+    source; ``point`` is the centre of the bounds, in which :func:`~lsu_mesh.fusion.fuse` puts that
+    by its rule; ``rejected`` are indices of sources that were left out.
     """
 
     support: Support

@@ -7,8 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.array_types import Matrix, Stack
+from lsu_mesh.array_types import Matrix, Stack, Vector
+from lsu_mesh.kernels.filter_point import CENTRE, MEAN, locate, locate_output
 from lsu_mesh.kernels.filter_step import MEET_BOX, PREDICT, UPDATE, advance, copy, describe, predict_output
+from lsu_mesh.kernels.points import density
+from lsu_mesh.kernels.points.room import LOWER, TARGET, Room, row_of
 from lsu_mesh.kernels.runtime.compile import inlined, kernel
 from lsu_mesh.kernels.runtime.scratch import Scratch, spare_state
 from lsu_mesh.kernels.runtime.unowned_views import borrowed
@@ -21,7 +24,8 @@ IN_PREDICT = 2
 class Models(NamedTuple):
     """Models of a bank: A (M, n, n), B (M, n, p), C (M, m, n), G (M, n, q), widths (M, q), r (M, m), domains (M, 2, n).
 
-    M = N, or M = 1 for all instances alike; domains (M, 0, n) where there is none.
+    M = N, or M = 1 for all instances alike; domains (M, 0, n) where there is none. Q (M, n, n) is the covariance of the
+    noise of a step.
     """
 
     A: Stack
@@ -31,6 +35,15 @@ class Models(NamedTuple):
     widths: Matrix
     r: Matrix
     domains: Stack
+    Q: Stack
+
+
+class Estimates(NamedTuple):
+    """The rule of the points, and densities means (N, n), covariances (N, n, n) beside the sets, for ``MEAN``."""
+
+    rule: int
+    means: Matrix
+    covariances: Stack
 
 
 class Record(NamedTuple):
@@ -49,22 +62,26 @@ class Record(NamedTuple):
 def sweep(
     family: int, option: int, updating: bool, last_prediction: bool, states: Stack, spare: Matrix, models: Models,
     Y: Stack, U: Stack, record: Record, outcome: NDArray[np.int64], first: int, last: int, work: Scratch,
+    estimates: Estimates, points: bool, room: Room,
 ) -> None:  # fmt: skip
     """Rows 1 … T of the instances first … last − 1, whose states (N, rows, n) go from the prior to the last one.
 
     Each row: predict the output, update with ``Y[i, k]``, record (all three only where ``updating``); then, but after
     the last row only with ``last_prediction``, predict with ``U[i, k]``. ``outcome`` (N, 2): the rows that are done,
     and ``DONE`` or where it stopped: ``IN_UPDATE`` (the state is the prediction of that row) or ``IN_PREDICT`` (the
-    state is the posterior of the row before). Y (N, T, m), U (N, T, p); spare (rows, n) and work are scratch.
+    state is the posterior of the row before). Y (N, T, m), U (N, T, p); spare (rows, n), work and room are scratch.
+    The densities go along with the states; points are recorded only where ``points``.
     """
     rows = Y.shape[1]
     models, record, work = _borrow_models(models), _borrow_record(record), borrowed(work)
     states, spare, Y, U = borrowed(states), borrowed(spare), borrowed(Y), borrowed(U)
-    bounded = models.domains.shape[1] > 0
+    means, covariances, room = borrowed(estimates.means), borrowed(estimates.covariances), borrowed(room)
+    bounded, rule = models.domains.shape[1] > 0, estimates.rule
+    last_action = MEET_BOX if bounded else PREDICT
     for i in range(first, last):
         j = i % models.A.shape[0]
         A, B, C, G = models.A[j], models.B[j], models.C[j], models.G[j]
-        widths, r, S = models.widths[j], models.r[j], states[i]
+        widths, r, S, mean, P = models.widths[j], models.r[j], states[i], means[i], covariances[i]
         met = spare_state(work, S.shape[1], S.shape[0])
         outcome[i, 0], outcome[i, 1] = rows, DONE
         # three actions a row through one call of advance: each further call would double the time of compiling
@@ -76,6 +93,10 @@ def sweep(
             source, target, low, high = S, spare, Y[i, k], r
             if action == UPDATE:
                 predict_output(family, S, C, r, record.y_lower[i, k], record.y_upper[i, k], record.y_points[i, k], work)
+                if points and rule != CENTRE:
+                    locate_output(
+                        family, rule, S, mean, P, C, record.points[i, k], record.y_points[i, k], work, room
+                    )  # fmt: skip
             elif action == MEET_BOX:
                 if not bounded:
                     continue
@@ -87,10 +108,29 @@ def sweep(
                 break
             if action != PREDICT or not bounded:
                 copy(target, S)
+            if rule == MEAN and action in (UPDATE, last_action):
+                _follow(action == UPDATE, mean, P, A, B, C, Y[i, k], r, U[i, k], models.Q[j], G, widths, room)
+                if not density.is_finite(mean, P):
+                    hull = row_of(room, S.shape[1], LOWER), row_of(room, S.shape[1], LOWER + 1)
+                    describe(family, S, row_of(room, S.shape[1], TARGET), hull[0], hull[1], work)
+                    density.start(hull[0], hull[1], mean, P)
             if action == UPDATE:
-                record.volumes[i, k] = describe(
-                    family, S, record.points[i, k], record.lower[i, k], record.upper[i, k], work
-                )
+                lower, upper, point = record.lower[i, k], record.upper[i, k], record.points[i, k]
+                record.volumes[i, k] = describe(family, S, point, lower, upper, work)
+                if points and rule != CENTRE:
+                    locate(family, rule, S, mean, P, lower, upper, point, room)
+
+
+@inlined
+def _follow(
+    updates: bool, mean: Vector, P: Matrix, A: Matrix, B: Matrix, C: Matrix, y: Vector, r: Vector, u: Vector,
+    Q: Matrix, G: Matrix, widths: Vector, room: Room,
+) -> None:  # fmt: skip
+    """The density, after a data update or a time update that has succeeded."""
+    if updates:
+        density.update(mean, P, C, y, r, r, room)
+    else:
+        density.predict(mean, P, A, B, u, Q, G, widths, widths.size, room)
 
 
 @inlined
@@ -103,6 +143,7 @@ def _borrow_models(m: Models) -> Models:
         borrowed(m.widths),
         borrowed(m.r),
         borrowed(m.domains),
+        borrowed(m.Q),
     )
 
 

@@ -26,6 +26,7 @@ def example(topic: str) -> Message:
             ("measurement", "sensor/s1", "8899aabbccddeeff", 41),
         ],
         "bounds": Bounds(rho=[0.1, 0.1], r=[0.3]), "missing": ["s2"], "point_rule": "mean", "algorithm": 1,
+        "mean": [0.25, 0.8], "covariance": [[0.04, 0.01], [0.01, 0.02]],
     }  # fmt: skip
     own: dict[str, dict[str, Any]] = {
         "truth": {"x": [0.1, 0.8]},
@@ -43,10 +44,13 @@ def example(topic: str) -> Message:
             "used": [("input", "plant/plant", "0011223344556677", 40)],
             "bounds": Bounds(rho=[0.1, 0.1], r=[0.3]),
             "algorithm": 1,
+            "point_rule": "mean",
         },
         "posterior": estimate,
         "fused": estimate
         | {
+            "mean": None,
+            "covariance": None,
             "policy": "relaxed",
             "faults": 1,
             "quarantined": [],

@@ -235,6 +235,8 @@ class Prediction(Message, frozen=True, kw_only=True):
     """What was not known: ``["input"]`` where the input box stood in for the input."""
     algorithm: Count | None = None
     """Number of the arithmetic of its filter; nil is 1."""
+    point_rule: PointRule | None = None
+    """How the state was chosen of which ``y_point`` is the output; nil: the centre of the hull, as older peers do."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -273,6 +275,10 @@ class Posterior(Message, frozen=True, kw_only=True):
     """How ``point`` was chosen; nil: the centre of the hull, as older peers do."""
     algorithm: Count | None = None
     """Number of the arithmetic of its kind or policy, raised whenever its bits change; nil is 1."""
+    mean: Numbers | None = None
+    covariance: Rows | None = None
+    """Density beside the set from which ``point`` is taken by the rule ``mean``, and the next densities are made; nil:
+    there is none."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)
@@ -285,6 +291,16 @@ class Posterior(Message, frozen=True, kw_only=True):
             _check_finite("log_volume", [self.log_volume])
         if self.gain is not None:
             _check_finite("gain", [self.gain])
+        self._check_density()
+
+    def _check_density(self) -> None:
+        if (self.mean is None) != (self.covariance is None):
+            raise ValueError("mean and covariance come together")
+        if self.mean is not None and self.covariance is not None:
+            if len(self.mean) != len(self.lower):
+                raise ValueError(f"mean has {len(self.mean)} entries, lower {len(self.lower)}")
+            _check_finite("mean", self.mean)
+            _check_matrix("covariance", self.covariance, len(self.lower), len(self.lower))
 
 
 class Rejection(_Strict, frozen=True, kw_only=True):

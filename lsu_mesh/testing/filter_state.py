@@ -156,6 +156,8 @@ class Witness:
         if not self._filter.is_resumable:
             return
         other.resume(self._filter.support, *(side.copy() for side in self._filter.bounds()))
+        if self._filter.density is not None:
+            other.take_density(self._filter.density)
         held = self._filter.snapshot()
         act(self._filter)
         expected = state_of(self._filter)

@@ -74,6 +74,8 @@ def test_a_filter_goes_on_from_what_it_published(make: Callable[..., Filter], wi
     assert one.is_resumable
     other = make(BATTERY, box(2, 9.0), box=with_box)
     other.resume(one.support, *(side.copy() for side in one.bounds()))
+    assert one.density is not None
+    other.take_density(one.density)
     for k in range(19, 39):
         for filter in (one, other):
             filter.predict(data.U[k])

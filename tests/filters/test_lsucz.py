@@ -92,7 +92,7 @@ def test_reduction_never_widens_the_bounds() -> None:
 
 
 def test_points() -> None:
-    by_hull, nearest = LSUCZ(MODEL, PRIOR), LSUCZ(MODEL, PRIOR, point="nearest")
+    by_hull, nearest = LSUCZ(MODEL, PRIOR, point="hull"), LSUCZ(MODEL, PRIOR, point="nearest")
     for estimator in (by_hull, nearest):
         estimator.update([0.9, 0.8])
     lower, upper = by_hull.bounds()
@@ -263,7 +263,7 @@ def test_growth_without_end_is_reported() -> None:
     [
         ({"max_generators": 2}, "max_generators must be at least 3"),
         ({"max_constraints": -1}, "max_constraints must not be negative"),
-        ({"point": "mean"}, 'point must be "hull" or "nearest"'),
+        ({"point": "middle"}, 'point must be "mean", "nearest" or "centre"'),
     ],
 )
 def test_wrong_options_are_named(options: dict[str, object], message: str) -> None:

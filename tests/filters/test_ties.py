@@ -35,7 +35,7 @@ def errors(ties: Ties) -> tuple[float, float]:
     data = simulate_all([model], draw(model, 100, 1, 20), 1.0)
     squares, spreads = [], []
     for X, Y, U in zip(data.X, data.Y, data.U, strict=True):
-        run = run_filter(LSUO(model, prior, meet=False, ties=ties), Y, U)
+        run = run_filter(LSUO(model, prior, meet=False, ties=ties, point="centre"), Y, U)
         squares.append(np.square(run.points[:, 1] - X[:, 1]).sum())
         spreads.append(np.std((run.points @ model.C.T - Y)[:, 1], ddof=1))
         assert ((run.lower <= X) & (run.upper >= X)).all()

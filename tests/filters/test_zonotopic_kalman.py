@@ -172,7 +172,7 @@ def test_squared_error_of_state_2_in_p2018(form: str, order: int, expected: floa
     for seed in range(10):
         rng = np.random.default_rng(seed)
         x = rng.uniform(-1, 1, 3)
-        estimator = ZonotopicKalman(model, PRIOR, order, form)
+        estimator = ZonotopicKalman(model, PRIOR, order, form, point="centre")
         total = 0.0
         for _ in range(100):
             estimator.update(model.C @ x + rng.uniform(-0.3, 0.3, 2))

@@ -30,6 +30,7 @@ POSTERIOR: dict[str, Any] = COMMON | {
     "volume_of": "support", "status": "ok", "revision": 0, "epoch": 0, "guarantee": "declared", "base": "prior",
     "used": [["measurement", "sensor/s", "0123456789abcdef", 7]], "bounds": {"rho": [0.1, 0.1], "r": [0.2]},
     "missing": [], "cause": None, "descent": [], "gain": None, "gain_of": None, "point_rule": None, "algorithm": None,
+    "mean": None, "covariance": None,
 }  # fmt: skip
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
@@ -79,7 +80,7 @@ def test_a_malformed_posterior_is_refused_with_the_reason(change: dict[str, Any]
     assert caught.value.reason == reason
 
 
-LATER = {"cause", "descent", "gain", "gain_of", "point_rule", "algorithm"}
+LATER = {"cause", "descent", "gain", "gain_of", "point_rule", "algorithm", "mean", "covariance"}
 
 
 @pytest.mark.parametrize("missing", sorted(set(POSTERIOR) - LATER))

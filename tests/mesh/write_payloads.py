@@ -41,11 +41,12 @@ ESTIMATE: Fields = {
 POSTERIOR: Fields = ESTIMATE | {
     "src": "filter/box", "kind": "LSUO", "point": [0.1, 0.75], "log_volume": -0.6931471805599453, "volume_of": "hull",
     "status": "inconsistent", "revision": 1, "cause": "measurement of s1", "gain": 0.1, "gain_of": "hull",
-    "point_rule": "nearest",
+    "point_rule": "mean", "mean": [0.1, 5e-324], "covariance": [[0.1, -0.0], [-0.0, 1e-300]],
 }  # fmt: skip
 PLAIN: Fields = POSTERIOR | {
     "status": "ok", "base": "prior", "used": [], "missing": [], "cause": None, "descent": [], "gain": None,
     "log_volume": None, "guarantee": "declared", "gain_of": None, "point_rule": None, "algorithm": None,
+    "mean": None, "covariance": None,
 }  # fmt: skip
 
 
@@ -63,6 +64,7 @@ def cases() -> Iterator[tuple[str, str, Fields]]:
     yield "measurement of nothing", "measurement", measured | {"y": [None], "time_ns": 0, "time_error_ns": None}
     yield "measurement without a step", "measurement", measured | {"step": 0}
     predicted = ESTIMATE | {"src": "filter/box", "y_lower": [-0.3], "y_upper": [1.1], "y_point": [0.4]}
+    predicted |= {"point_rule": "mean"}
     for name in SETS:
         yield f"prediction, {name}", "prediction", predicted | {"support": typed(name), "missing": ["input"]}
         yield f"posterior, {name}", "posterior", POSTERIOR | {"support": typed(name)}

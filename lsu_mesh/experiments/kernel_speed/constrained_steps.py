@@ -71,7 +71,7 @@ def _steps(generators: int, constraints: int, steps: int, *, beside_zonoopt: boo
     """Time update, data update and hull of ``steps`` steps of P3, by LSUCZ and by zonoopt."""
     model = get("P3")
     data = simulate(model, FIRST + steps + 1, seed=1)
-    engine = LSUCZ(model, Orthotope([-1.0] * 3, [1.0] * 3), generators, constraints)
+    engine = LSUCZ(model, Orthotope([-1.0] * 3, [1.0] * 3), generators, constraints, point="centre")
     own, other = [], []
     for k in range(FIRST + steps):
         engine.update(data.Y[k])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,7 +82,7 @@ def _cost(kind: str, n: int, rounds: int, seconds: float) -> StepCost:
     candidates = {"single": _one_by_one(kind, model, data)}
     kind_class: Any = filter_class(kind)
     if issubclass(kind_class, CompiledFilter):
-        candidates["loop"] = _loop(kind_class(model, prior), data)
+        candidates["loop"] = _loop(kind_class(model, prior, point="centre"), data)
         candidates["bank"] = _bank(kind_class, model, BANK_INSTANCES, BANK_ROWS)
     if kind in PLAIN:
         candidates["numpy"] = Candidate(lambda: plain_run(kind, model, data, PLAIN_ROWS), PLAIN_ROWS)
@@ -114,8 +114,8 @@ def bank_speed(instances: int, rows: int, rounds: int, seconds: float) -> BankSp
 
 def _one_by_one(kind: str, model: LSUModel, data: Simulation) -> Candidate:
     """Output prediction, update, bounds and prediction, each called from Python; the same rows again and again."""
-    kind_class: Any = filter_class(kind)
-    engine: Filter = kind_class(model, unit_box(model.state_count), **options_of(kind, model.state_count))
+    kind_class, n = cast("Any", filter_class(kind)), model.state_count
+    engine: Filter = kind_class(model, unit_box(n), point="centre", **options_of(kind, n))
     rows = list(zip(data.Y, data.U, strict=True))[: 2 * SINGLE_ROWS]
 
     def steps(some: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> None:
@@ -150,7 +150,7 @@ def _bank(kind: Any, model: LSUModel, instances: int, rows: int) -> Candidate:
     random = np.random.default_rng(1)
     Y = random.uniform(-1.0, 1.0, (instances, rows, model.output_count)) * model.r
     U = np.zeros((instances, rows, model.input_count))
-    bank = FilterBank(kind, model, [unit_box(model.state_count)] * instances, threads=1)
+    bank = FilterBank(kind, model, [unit_box(model.state_count)] * instances, threads=1, point="centre")
 
     def again() -> None:
         _, done = bank.run(Y, U)

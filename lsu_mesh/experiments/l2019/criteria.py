@@ -107,7 +107,7 @@ def run_bank(
     """All runs of all models through one bank, from the prior box."""
     every = [model for model in models for _ in range(runs)]
     priors = [prior(models[0])] * len(every)
-    record, done = FilterBank(kind, every, priors, threads=1, **options).run(data.Y, data.U)
+    record, done = FilterBank(kind, every, priors, threads=1, point="centre", **options).run(data.Y, data.U)
     if (done < data.Y.shape[1]).any():
         raise AssertionError(f"{kind.__name__}: data that fulfil the bounds contradict the set")
     return record

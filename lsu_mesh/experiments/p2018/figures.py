@@ -39,7 +39,7 @@ class States(NamedTuple):
 def states(seed: int) -> States:
     """A part of one run."""
     model, data = data_of(seed, LAST)
-    record = run_filter(LSUO(model, prior(model), meet=False), data.Y, data.U)
+    record = run_filter(LSUO(model, prior(model), meet=False, point="centre"), data.Y, data.U)
     shown = slice(FIRST - 1, LAST)
     return States(*(values[shown] for values in (data.X, record.points, record.lower, record.upper)))
 

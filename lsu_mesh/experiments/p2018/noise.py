@@ -31,7 +31,7 @@ def errors(seed: int, runs: int) -> Errors:
     models = [systems.get("P3", rho=rho, r=r) for rho in LEVELS for r in LEVELS]
     data = simulate_all(models, draw(models[0], STEPS, seed, runs), START)
     every = [model for model in models for _ in range(runs)]
-    record, _ = FilterBank(LSUO, every, [prior(models[0])] * len(every), meet=False).run(data.Y, data.U)
+    record, _ = FilterBank(LSUO, every, [prior(models[0])] * len(every), meet=False, point="centre").run(data.Y, data.U)
     squares = np.square(record.points[:, :, STATE] - data.X[:, :, STATE]).reshape(len(models), -1).mean(axis=1)
     return Errors(np.sqrt(squares).reshape(len(LEVELS), len(LEVELS)))
 

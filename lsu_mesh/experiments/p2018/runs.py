@@ -43,30 +43,38 @@ class Estimator(NamedTuple):
 
 
 ESTIMATORS: Mapping[str, Estimator] = {
-    "LSUO": Estimator(lambda model, prior: LSUO(model, prior, meet=False), "LSU", filtered_output=True),
+    "LSUO": Estimator(lambda model, prior: LSUO(model, prior, meet=False, point="centre"), "LSU", filtered_output=True),
     "WindowMAP, vertex": Estimator(
         lambda model, prior: WindowMAP(model, prior, window=WINDOW, kappa=KAPPA, point="vertex"),
         "WIN",
         is_guaranteed=False,
     ),
     "ZKF q=15, predictor": Estimator(
-        lambda model, prior: ZonotopicKalman(model, prior, order=15, form="predictor", box=False, scaled=False),
+        lambda model, prior: ZonotopicKalman(
+            model, prior, order=15, form="predictor", box=False, scaled=False, point="centre"
+        ),
         "ZKF q=15",
     ),
     "ZKF q=3, predictor": Estimator(
-        lambda model, prior: ZonotopicKalman(model, prior, order=3, form="predictor", box=False, scaled=False),
+        lambda model, prior: ZonotopicKalman(
+            model, prior, order=3, form="predictor", box=False, scaled=False, point="centre"
+        ),
         "ZKF q=3",
     ),
     "ZKF q=15, filter": Estimator(
-        lambda model, prior: ZonotopicKalman(model, prior, order=15, box=False, scaled=False)
+        lambda model, prior: ZonotopicKalman(model, prior, order=15, box=False, scaled=False, point="centre")
     ),
-    "ZKF q=3, filter": Estimator(lambda model, prior: ZonotopicKalman(model, prior, order=3, box=False, scaled=False)),
+    "ZKF q=3, filter": Estimator(
+        lambda model, prior: ZonotopicKalman(model, prior, order=3, box=False, scaled=False, point="centre")
+    ),
     "WindowMAP, centre": Estimator(
         lambda model, prior: WindowMAP(model, prior, window=25, kappa=KAPPA), is_guaranteed=False
     ),
-    "LSUO, met with the prediction": Estimator(lambda model, prior: LSUO(model, prior), filtered_output=True),
-    "LSUPB": Estimator(lambda model, prior: LSUPB(model, prior), filtered_output=True),
-    "LSUCZ": Estimator(lambda model, prior: LSUCZ(model, prior), filtered_output=True),
+    "LSUO, met with the prediction": Estimator(
+        lambda model, prior: LSUO(model, prior, point="centre"), filtered_output=True
+    ),
+    "LSUPB": Estimator(lambda model, prior: LSUPB(model, prior, point="centre"), filtered_output=True),
+    "LSUCZ": Estimator(lambda model, prior: LSUCZ(model, prior, point="centre"), filtered_output=True),
 }
 STATISTICS = (
     "Σ (x̂₂ − x₂)²", "median (x̂₂ − x₂)", "std (x̂₂ − x₂)", "median (ŷ₁ − y₁)", "std (ŷ₁ − y₁)", "median (ŷ₂ − y₂)",

@@ -27,11 +27,11 @@ SETTLED = 10
 GENERATORS, CONSTRAINTS = 20, 8
 """Limits of complexity of LSUCZ: the paper gives none."""
 BOXES: Mapping[str, Callable[[LSUModel, Orthotope], CompiledFilter]] = {
-    "LSUO": lambda model, prior: LSUO(model, prior, meet=False),
-    "LSUP": lambda model, prior: LSUP(model, prior, time_update="image", box=False),
-    "LSUO, met with the prediction": lambda model, prior: LSUO(model, prior),
-    "LSUP, strips": lambda model, prior: LSUP(model, prior, time_update="strips", box=False),
-    "LSUPB": lambda model, prior: LSUPB(model, prior),
+    "LSUO": lambda model, prior: LSUO(model, prior, meet=False, point="centre"),
+    "LSUP": lambda model, prior: LSUP(model, prior, time_update="image", box=False, point="centre"),
+    "LSUO, met with the prediction": lambda model, prior: LSUO(model, prior, point="centre"),
+    "LSUP, strips": lambda model, prior: LSUP(model, prior, time_update="strips", box=False, point="centre"),
+    "LSUPB": lambda model, prior: LSUPB(model, prior, point="centre"),
 }
 CZ_HULL, CZ_NEAREST = "LSUCZ-1", "LSUCZ-2"
 
@@ -71,7 +71,7 @@ def errors(job: Job) -> dict[str, Errors]:
 
 def _zonotopes(model: LSUModel, prior: Orthotope, data: Simulation) -> dict[str, Errors]:
     """Both points of the same sets."""
-    engine = LSUCZ(model, prior, GENERATORS, CONSTRAINTS)
+    engine = LSUCZ(model, prior, GENERATORS, CONSTRAINTS, point="centre")
     hulls, nearest, lower, upper = (np.empty_like(data.X) for _ in range(4))
     for k in range(len(data.X)):
         engine.update(data.Y[k])

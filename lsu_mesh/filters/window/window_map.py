@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, cast
+from typing import ClassVar, Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from lsu_mesh.array_types import Counts, Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
+from lsu_mesh.filters.point_rule import PointOption, PointRule, point_rule
 from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
 from lsu_mesh.filters.validation import checked_prior, input_interval, output_vector, same_states
 from lsu_mesh.filters.window.interval_estimate import interval_estimate
@@ -54,7 +55,8 @@ class WindowMAP(Filter):
         ``"sum"``: Σ rho + Σ r, eq. (21). ``"log"``: Σ ln rho + Σ ln r, eq. (20), by reweighting; it can drive a
         half-width to 0.
     point:
-        ``"centre"``: a centred point of the optimal face. ``"vertex"``: a vertex, by HiGHS's simplex method.
+        ``"mean"``, ``"nearest"`` or ``"centre"``: a centred point of the optimal face. ``"vertex"``: a vertex, by
+        HiGHS's simplex method. Either lies in the published interval.
     rho_range, r_range:
         Pairs (lower, upper) of limits of the half-widths, each a number or one per entry; equal ones fix a half-width.
 
@@ -82,7 +84,7 @@ class WindowMAP(Filter):
         kappa: float = 1.0,
         handover: float = 1.0,
         objective: Literal["sum", "log"] = "sum",
-        point: Selected = "centre",
+        point: PointOption | Literal["vertex"] = "mean",
         rho_range: tuple[ArrayLike, ArrayLike] = (0.0, np.inf),
         r_range: tuple[ArrayLike, ArrayLike] = (0.0, np.inf),
     ) -> None:
@@ -90,8 +92,8 @@ class WindowMAP(Filter):
             raise ModelError(f"window must be at least 1, it is {window}")
         if objective not in ("sum", "log"):
             raise ModelError(f'objective must be "sum" or "log", it is {objective!r}')
-        if point not in ("centre", "vertex"):
-            raise ModelError(f'point must be "centre" or "vertex", it is {point!r}')
+        if point not in (*get_args(PointOption), "vertex"):
+            raise ModelError(f'point must be "mean", "nearest", "centre" or "vertex", it is {point!r}')
         for name, value in (("kappa", kappa), ("handover", handover)):
             if not (np.isfinite(value) and value > 0):
                 raise ModelError(f"{name} must be a number > 0, it is {value}")
@@ -100,7 +102,8 @@ class WindowMAP(Filter):
         self._program = WindowProgram(self._structure, HalfWidths.separate(low, high, np.ones(low.size)))
         self._model, self._length = model, window
         self._kappa, self._handover, self._objective = kappa, handover, objective
-        self._point = point
+        self._point: Selected = "vertex" if point == "vertex" else "centre"
+        self._point_rule: PointRule = "nearest" if point == "vertex" else point_rule(point)
         self.reset(checked_prior(model, prior))
 
     @property
@@ -112,6 +115,11 @@ class WindowMAP(Filter):
     def point(self) -> Vector:
         """Estimate (n,) of the state now."""
         return np.array(self._state.data.X[-1])
+
+    @property
+    def point_rule(self) -> PointRule:
+        """The rule of :attr:`point`; a vertex is said to be ``"nearest"``: it lies in the interval."""
+        return self._point_rule
 
     @property
     def rho(self) -> Vector:

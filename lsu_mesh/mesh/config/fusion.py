@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import get_args
 
+from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.filters import read_names
 from lsu_mesh.mesh.config.problem import Problem, Problems
 from lsu_mesh.mesh.config.settings import FilterSettings, FusionSettings, IdentifierSettings, Learn, SensorSettings
 from lsu_mesh.mesh.config.table import Table
 
+POINT_RULES: tuple[PointRule, ...] = get_args(PointRule)
 LEARN: tuple[Learn, ...] = get_args(Learn)
 
 
@@ -35,6 +37,7 @@ def read_fusion(
     quarantine_after = table.whole("quarantine_after", 20, low=1)
     max_generators = table.whole("max_generators", 30, low=1, high=1000)
     max_constraints = table.whole("max_constraints", 12, low=0, high=500)
+    point = table.choice("point", POINT_RULES, "mean")
     table.finish()
     return FusionSettings(
         name=name,
@@ -46,6 +49,7 @@ def read_fusion(
         quarantine_after=quarantine_after,
         max_generators=max_generators,
         max_constraints=max_constraints,
+        point=point,
     )
 
 

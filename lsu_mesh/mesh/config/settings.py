@@ -14,6 +14,7 @@ import numpy as np
 
 from lsu_mesh.filters.filter import GainOf
 from lsu_mesh.filters.grid import OffGrid
+from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.mesh.config.digest import digest
 from lsu_mesh.mesh.config.problem import Problem
 from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
@@ -149,6 +150,7 @@ class FusionSettings:
     quarantine_after: int
     max_generators: int
     max_constraints: int
+    point: PointRule = "mean"
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
+from lsu_mesh.filters.point_rule import PointRule
+from lsu_mesh.fusion.point import point_of
 from lsu_mesh.fusion.policies import Policy
 from lsu_mesh.mesh.config.settings import Configuration, FusionSettings
 from lsu_mesh.mesh.estimation.held_set import WEAKNESS
@@ -74,9 +76,19 @@ def fusion_engine(configuration: Configuration, settings: FusionSettings) -> Fil
         configuration.prior,
         max_generators=settings.max_generators,
         max_constraints=settings.max_constraints,
+        point="centre",
     )
     engine.skips_met = False
     return engine
+
+
+def fused_point(support: Support, bounds: tuple[Vector, Vector], used: Sequence[Source], rule: PointRule) -> Vector:
+    """The point (n,) of a fused set with these bounds, by the points and bounds of the sources that went into it.
+
+    Without any source, where a step is only predicted, it is the point that is nearest to the centre of the hull.
+    """
+    told = [(np.array(one.message.point), *one.bounds) for one in sorted(used, key=lambda one: one.name)]
+    return point_of(support, bounds, told, rule)
 
 
 def fusion_algorithm(policy: Policy) -> int:

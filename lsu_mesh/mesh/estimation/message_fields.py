@@ -5,8 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from lsu_mesh.array_types import Vector
+from lsu_mesh.filters.density import Density
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.point_rule import PointRule
+from lsu_mesh.mesh.messages import Posterior
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 
@@ -21,6 +26,8 @@ def described(engine: Filter) -> dict[str, Any]:
         "lower": lower.tolist(),
         "upper": upper.tolist(),
         "point": engine.point.tolist(),
+        "point_rule": engine.point_rule,
+        **told_density(engine.density),
         "log_volume": finite_or_none(log_volume),
         "volume_of": "support" if is_plain else "hull",
     }
@@ -41,15 +48,31 @@ def foretold(engine: Filter, input_box: Orthotope | None) -> dict[str, Any]:
         "y_lower": band.lower.tolist(),
         "y_upper": band.upper.tolist(),
         "y_point": band.point.tolist(),
+        "point_rule": engine.point_rule,
     }
 
 
-def described_box(lower: Vector, upper: Vector) -> dict[str, Any]:
-    """The fields of a fused set that its bounds (n,), (n,) give."""
+def told_density(density: Density | None) -> dict[str, Any]:
+    """The fields of the density beside a set."""
+    if density is None:
+        return {"mean": None, "covariance": None}
+    return {"mean": density.mean.tolist(), "covariance": density.covariance.tolist()}
+
+
+def density_of(message: Posterior) -> Density | None:
+    """The density that a message tells of."""
+    if message.mean is None or message.covariance is None:
+        return None
+    return Density(np.array(message.mean), np.array(message.covariance).reshape(len(message.mean), -1))
+
+
+def described_fusion(lower: Vector, upper: Vector, point: Vector, rule: PointRule) -> dict[str, Any]:
+    """The fields of a fused set that its bounds (n,), (n,) and its point (n,) by a rule give."""
     return {
         "lower": lower.tolist(),
         "upper": upper.tolist(),
-        "point": (lower + 0.5 * (upper - lower)).tolist(),
+        "point": point.tolist(),
+        "point_rule": rule,
         "log_volume": finite_or_none(Orthotope(lower, upper).log_volume()),
         "volume_of": "hull",
     }

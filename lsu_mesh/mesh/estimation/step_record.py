@@ -65,11 +65,12 @@ class Combined:
 
 
 def published_content(posterior: Posterior) -> tuple[object, ...]:
-    """What makes a step worth telling again when it changes: the set, what it is worth, and who is not in it.
+    """What makes a step worth telling again when it changes: the set, its density and its worth, and who is not in it.
 
     Later sets name the published one as their base, so they must descend from what it says.
     """
     box = posterior.lower, posterior.upper
+    beside = posterior.mean, posterior.covariance
     rejected = (posterior.rejected,) if isinstance(posterior, Fused) else ()
     claims = posterior.status, posterior.epoch, posterior.descent, posterior.guarantee, posterior.missing
-    return posterior.support, box, *claims, *rejected
+    return posterior.support, box, beside, *claims, *rejected

@@ -16,6 +16,7 @@ from lsu_mesh.errors import InconsistentData, UnboundedSupport
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.estimation.message_fields import told_density
 from lsu_mesh.mesh.estimation.step_record import Combined, Step, published_content
 from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.warm_up import warm_up
@@ -200,8 +201,9 @@ class Estimator(StartingNode):
         held = self.held
         support, old = to_message(self.engine.support), step.published
         box = tuple(bound.tolist() for bound in self.published_bounds())
+        beside = tuple(told_density(self.engine.density).values())
         claims = (combined.status, held.epochs.number, held.descent, held.guarantee, list(combined.missing))
-        if old is not None and (support, box, *claims, *self.content()) == published_content(old):
+        if old is not None and (support, box, beside, *claims, *self.content()) == published_content(old):
             held.record_published(old)
             return None
         step.revision += 1

@@ -15,11 +15,12 @@ from lsu_mesh.mesh.estimation.fusion_step import (
     Source,
     family_step,
     fused_guarantee,
+    fused_point,
     fusion_algorithm,
     fusion_engine,
     fusion_step,
 )
-from lsu_mesh.mesh.estimation.message_fields import described_box
+from lsu_mesh.mesh.estimation.message_fields import described_fusion
 from lsu_mesh.mesh.estimation.quarantine import Quarantine, Say
 from lsu_mesh.mesh.estimation.step_record import Combined, Status, Step
 from lsu_mesh.mesh.estimation.transfer import SOUND
@@ -51,6 +52,8 @@ class FusionNode(Estimator):
         engine = fusion_engine(configuration, self.settings)
         super().__init__(configuration, name, boot, engine=engine, sources=self.settings.sources)
         self._rejected: list[Rejection] = []
+        self._used: Sequence[Source] = ()
+        """Sources that are in the set of the current step, whose points its own is made of."""
         self._quarantine = Quarantine(self.sources, self.settings.quarantine_after, self.settings.max_lag)
         self._reported: set[tuple[int, str]] = set()
         """Steps and sources whose contradiction was told; a step that is done again does not tell it again."""
@@ -138,6 +141,7 @@ class FusionNode(Estimator):
             and self.start_without_data(k, abandons=False)
         ):
             outcome = family_step(self.engine, sources)
+        self._used = outcome.used
         status, cause, told = self._conclude(k, outcome, now)
         messages += told
         agreeing = sources if status != "inconsistent" else []
@@ -289,9 +293,10 @@ class FusionNode(Estimator):
         return (self._rejected,)
 
     def posterior(self, k: int, step: Step, combined: Combined, support: SupportMessage, now: int) -> Posterior:
+        rule, bounds = self.settings.point, self.engine.bounds()
         return Fused(
             **self.stamp("fused", k, now, combined.origin),
-            **described_box(*self.engine.bounds()),
+            **described_fusion(*bounds, fused_point(self.engine.support, bounds, self._used, rule), rule),
             kind="fusion",
             support=support,
             status=combined.status,

@@ -11,6 +11,7 @@ from lsu_mesh.errors import InconsistentData
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.held_set import HeldSet
+from lsu_mesh.mesh.estimation.message_fields import density_of
 from lsu_mesh.mesh.estimation.timeline import Timeline
 from lsu_mesh.mesh.messages import Base, Message, Posterior, Reference
 from lsu_mesh.mesh.nodes.node import SECOND, Node
@@ -93,6 +94,8 @@ class StartingNode(Node):
             return False
         try:
             self._begin(candidate.step, to_support(candidate.support), candidate.reference)
+            if candidate.src == f"{self.role}/{self.name}" and (density := density_of(candidate)) is not None:
+                self.engine.take_density(density)
         except InconsistentData:  # it is empty: whoever sent it was wrong
             self._candidate = None
             return False

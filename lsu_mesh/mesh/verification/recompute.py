@@ -18,8 +18,15 @@ from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, filter_algorithm, is_due, make_engine
 from lsu_mesh.mesh.estimation.filter_step import Transfers, contradiction_rule, filter_step
-from lsu_mesh.mesh.estimation.fusion_step import OUTVOTED, Source, fusion_algorithm, fusion_engine, fusion_step
-from lsu_mesh.mesh.estimation.message_fields import described, described_box, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.fusion_step import (
+    OUTVOTED,
+    Source,
+    fused_point,
+    fusion_algorithm,
+    fusion_engine,
+    fusion_step,
+)
+from lsu_mesh.mesh.estimation.message_fields import density_of, described, described_fusion, finite_or_none, foretold
 from lsu_mesh.mesh.estimation.open_loop import MAX_LISTED, OpenLoop
 from lsu_mesh.mesh.estimation.step_data import DataOfSteps
 from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
@@ -50,6 +57,8 @@ class Recomputed:
     outvoted: frozenset[str] | None = field(default_factory=frozenset)
 
 
+OF_POINTS = ("point", "y_point", "point_rule", "mean", "covariance")
+"""Fields that rest on the rule of the points."""
 MAX_KEPT = 8192
 """So many states are remembered of a filter whose messages do not tell all that it holds."""
 
@@ -91,7 +100,7 @@ class Recomputation(ABC):
         if not self._engine.is_resumable:
             self._keep(recorded.reference)
         fields = {**found.fields, "support": to_message(self._engine.support)}
-        return replace(found, fields=fields, is_widened=is_widened)
+        return replace(found, fields=_told(recorded, fields), is_widened=is_widened)
 
     def prediction(self, recorded: Prediction) -> Recomputed:
         """What a prediction has by its base and the input of the step before."""
@@ -102,13 +111,9 @@ class Recomputation(ABC):
         elif (k := self._hold_base(recorded, recorded.base)) < recorded.step:
             predict_step(self._engine, self._configuration, k, *self._own_inputs(recorded))
         bounds = {} if recorded.bounds is None else {"bounds": self._noise_bounds()}
-        return Recomputed(
-            {
-                **foretold(self._engine, self._configuration.input_box),
-                **bounds,
-                "support": to_message(self._engine.support),
-            }
-        )
+        told = foretold(self._engine, self._configuration.input_box)
+        fields = {**told, **bounds, "support": to_message(self._engine.support)}
+        return Recomputed(_told(recorded, fields))
 
     def other_algorithm(self, recorded: Posterior | Prediction) -> str | None:
         """The number of the arithmetic that computed a set, in words, where it is not today's: its bits may differ."""
@@ -163,7 +168,14 @@ class Recomputation(ABC):
             self._hold(message)
         else:
             self._engine.reset(to_support(message.support))
+            if message.src == recorded.src:
+                self._take_density(message)
         return message.step
+
+    def _take_density(self, message: Posterior) -> None:
+        density = density_of(message)
+        if density is not None:
+            self._engine.take_density(density)
 
     def _reach(self, recorded: Posterior | Prediction) -> Orthotope:
         """The prior carried to a step; the set lists the inputs of it where a box may have stood in for one."""
@@ -186,6 +198,7 @@ class Recomputation(ABC):
         """Hold what the same process held when it published a posterior."""
         if self._engine.is_resumable:
             self._engine.resume(to_support(own.support), np.array(own.lower), np.array(own.upper))
+            self._take_density(own)
         elif own.reference in self._kept:
             self._engine.restore(self._kept[own.reference])
         else:
@@ -227,6 +240,13 @@ class Recomputation(ABC):
     def _noise_bounds(self, factor: float = 1.0) -> Bounds:
         rho, r = self._engine.half_widths
         return Bounds(rho=rho.tolist(), r=(r * factor).tolist())
+
+
+def _told(recorded: Posterior | Prediction, fields: Fields) -> Fields:
+    """The fields without those of points where a message, of an older peer, does not say how its point was chosen."""
+    if recorded.point_rule is not None:
+        return fields
+    return {name: value for name, value in fields.items() if name not in OF_POINTS}
 
 
 def _since(message: Input | None) -> int | None:
@@ -333,7 +353,9 @@ class FusionRecomputation(Recomputation):
             raise DoesNotFit("used", f"sources of step {k} held by {expected}", f"by {outcome.basis}")
         if not self._policy.is_intersection:
             outvoted = frozenset(source.name for source in outcome.rejected)
-        fields = {**described_box(*self._engine.bounds()), "kind": "fusion", "bounds": self._noise_bounds()}
+        rule, bounds = self._settings.point, self._engine.bounds()
+        point = fused_point(self._engine.support, bounds, outcome.used, rule)
+        fields = {**described_fusion(*bounds, point, rule), "kind": "fusion", "bounds": self._noise_bounds()}
         return Recomputed(fields, "ok" if sources else "predicted", outvoted=outvoted)
 
     def _outvoted(self, used: Sequence[Source], recorded: Fused) -> frozenset[str] | None:

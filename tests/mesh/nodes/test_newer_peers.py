@@ -19,8 +19,8 @@ LATER = {
     "input": {"time_ns"},
     "measurement": {"time_error_ns"},
     "prediction": {"base", "used", "bounds", "missing", "algorithm"},
-    "posterior": {"gain_of", "point_rule", "algorithm"},
-    "fused": {"gain_of", "point_rule", "algorithm"},
+    "posterior": {"gain_of", "point_rule", "algorithm", "mean", "covariance"},
+    "fused": {"gain_of", "point_rule", "algorithm", "mean", "covariance"},
     "health": {"started_ns", "host"},
 }
 """Fields that the first peers of version 1 do not send."""
