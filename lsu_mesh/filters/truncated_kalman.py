@@ -61,6 +61,11 @@ class TruncatedKalman(Kalman):
         with the domain once more."""
         return np.clip(self._held.mean, self._lower, self._upper)
 
+    @property
+    def untruncated(self) -> Gaussian:
+        """The density before the truncation of the last data update."""
+        return self._full
+
     def update(
         self,
         y: ArrayLike,
