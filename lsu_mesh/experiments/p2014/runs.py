@@ -63,9 +63,9 @@ class Result(NamedTuple):
 
     ``states`` (3,), ``fits`` (2,), ``predictions`` (2,): mean absolute errors of states, of outputs that the estimate
     has seen, and of outputs before it has. ``volume``: V, or V_KF. ``outside`` (3,): N, or N_KF with κ³ as printed, in
-    %, for κ = 1, 1.5, 2. ``other`` (3,): the share of single coordinates outside, or N_KF with κ². ``untruncated`` (3,):
-    N_KF with κ³ and the P before its truncation; NaN for a window. ``ellipsoid``: the volume that P gives, 4/3 π √|P|.
-    ``seconds``: of a step.
+    %, for κ = 1, 1.5, 2. ``other`` (3,): the share of single coordinates outside, or N_KF with κ². ``untruncated``
+    (3,): as ``outside`` with the P before its truncation; NaN for a window. ``ellipsoid``: the volume that P gives,
+    4/3 π √|P|. ``seconds``: of a step.
     """
 
     states: Array
@@ -161,7 +161,7 @@ def _size(filter: Filter, X: Array, t: int, window: int) -> tuple[float, Shares,
 
 
 def untruncated_determinant(factor: float) -> float:
-    """det P of the Kalman filter without truncation, which no data change: after as many steps as it takes to settle."""
+    """det P of the Kalman filter without truncation once it has settled; no data change it."""
     size, box = np.sqrt(factor), (LOWER, UPPER)
     filter = Kalman(LSUModel(A=A, B=B, C=C, rho=size * RHO, r=size * R), box)
     for _ in range(SETTLED):
