@@ -26,7 +26,7 @@ def ratio(job: Job) -> float:
     models = job.models()
     data = simulate_all(models, job.draws(), START)
     box, body = (
-        of_a_filter(run_bank(*KINDS[name], models, job.runs, data), data)["T outputs"].mean()
+        of_a_filter(run_bank(*KINDS[name], models, job.runs, data), data, models[0].C)["T outputs"].mean()
         for name in ("LSUO", "LSUP")
     )
     return float(box / body)
@@ -46,8 +46,8 @@ def of_seeds(found: dict[int, float]) -> Row:
     return stated(
         ("S2", f"T3 ÷ T4 at ρ = r = {NOISE:g}, seeds {min(found)} to {max(found)}, {MIN_RATIO:g} at least"),
         "about 100", values, holds=not below,
-        why=f"seeds {_listed(below)} are below {MIN_RATIO:g}, down to {min(found.values()):.3g}: LSUO's error is a "
-        "random walk of the velocity, whose size depends on the draw",
+        why=f"seeds {_listed(below)} are below {MIN_RATIO:g}, down to {min(found.values()):.3g}; the ratio depends on "
+        "the draw",
     )  # fmt: skip
 
 
