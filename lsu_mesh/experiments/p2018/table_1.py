@@ -28,9 +28,10 @@ def spread_of(found: Sequence[Result], statistic: str) -> Spread:
 
 def comparison(found: Found) -> Iterator[Row]:
     """The table's columns one below the other."""
-    for name, estimator in ESTIMATORS.items():
-        for i, statistic in enumerate(STATISTICS if estimator.column else ()):
-            here, paper = spread_of(found[name], statistic), PAPER[estimator.column][i]
+    for name in found:
+        column = ESTIMATORS[name].column
+        for i, statistic in enumerate(STATISTICS if column else ()):
+            here, paper = spread_of(found[name], statistic), PAPER[column][i]
             why = _why(found, name, statistic)
             if 0.0 < abs(paper) < EXACT:
                 yield stated((name, statistic), f"{paper:.0e}", here, holds=abs(here.mean) < EXACT, why=why)

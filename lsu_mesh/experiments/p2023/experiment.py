@@ -121,11 +121,11 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
 def _notes(setting: str, seed: int) -> str:
     return (
         f"System (15) of P2018 with ω = {OMEGA:g}, ν = 10^−K, {setting} from seed {seed}, u ~ N(0, 1). Neither the "
-        f"prior nor the limits of complexity are in the paper: here the box ±{START:g}, from which x_1 is drawn, and at "
-        f"most {GENERATORS} generators and {CONSTRAINTS} constraints. RMSE and MAE are over all steps and states, as "
-        f"the paper's seem to be. For K ≥ {LOW_NOISE:g} a number is *undecided* if more than half of its sum falls in "
-        f"the first {SETTLED - 1} steps: it is that of the prior. LSUO is shown with both rules for a strip that leaves "
-        "two parallelotopes of equal volume; the paper does not say which it has.\n\n"
+        f"prior nor the limits of complexity are in the paper: here the box ±{START:g}, from which x_1 is drawn, and "
+        f"at most {GENERATORS} generators and {CONSTRAINTS} constraints. RMSE and MAE are over all steps and states, "
+        f"as the paper's seem to be. For K ≥ {LOW_NOISE:g} a number is *undecided* if more than half of its sum falls "
+        f"in the first {SETTLED - 1} steps: it is that of the prior. LSUO is shown with both rules for a strip that "
+        "leaves two parallelotopes of equal volume; the paper does not say which it has.\n\n"
         "The column of LSUCZ at large ν is unexplained. The dynamics forget the prior, so a guaranteed set is small "
         "without any output, as the table of cuts shows. Other limits of complexity, down to no constraint at all, and "
         "other priors were tried; the last table has what they give."

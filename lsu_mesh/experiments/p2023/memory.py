@@ -35,7 +35,7 @@ def memory(job: Job) -> Memory:
     """One simulation."""
     model, prior, data = simulated(job)
     fed, blind = (LSUCZ(model, prior, GENERATORS, CONSTRAINTS, **CENTRE) for _ in range(2))
-    cuts, errors = 0, []
+    cuts, errors, late = 0, [], min(LATE - 1, job.steps // 2)
     for k in range(job.steps):
         before = fed.bounds()
         fed.update(data.Y[k])
@@ -43,7 +43,7 @@ def memory(job: Job) -> Memory:
         if k >= SETTLED - 1:
             room = CUT * (before[1] - before[0])
             cuts += bool((lower > before[0] + room).any() or (upper < before[1] - room).any())
-        if k >= LATE - 1:
+        if k >= late:
             errors.append((fed.point - data.X[k], blind.point - data.X[k]))
         for one in (fed, blind):
             one.predict(data.U[k])
@@ -68,7 +68,7 @@ def table(found: Mapping[float, Sequence[Memory]], steps: int) -> Table:
     for K, runs in found.items():
         rows.append((f"{K:g}", *(Spread.of([one[i] for one in runs]) for i in range(len(Memory._fields)))))
     title = (
-        f"What LSUCZ-1 owes to the outputs: cuts from step {SETTLED} on, errors from step {LATE} on; the spectral radius "
-        f"of A is {spectral_radii()[0]:.2f}, that of abs(A) {spectral_radii()[1]:.2f}"
+        f"What LSUCZ-1 owes to the outputs: cuts from step {SETTLED} on, errors from step {LATE} on; the spectral "
+        f"radius of A is {spectral_radii()[0]:.2f}, that of abs(A) {spectral_radii()[1]:.2f}"
     )
     return Table("p2023-memory", title, columns, rows)

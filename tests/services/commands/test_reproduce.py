@@ -22,7 +22,7 @@ def made(limit: float) -> Outcome:
 
         return draw_transfer(
             [
-                transfer.Result("S2", "LSUPB", "predictor", r, 0.5, 0.6, 0.7, 3.0, 0.8, 0.9, 1.0, 0.0, 0.0)
+                transfer.Result("S2", "LSUPB", "predictor", r, 0.5, 0.6, 0.7, 3.0, 0.8, 0.9, 1.1, 1.0, 0.0, 0.0)
                 for r in (1, 2)
             ]
         )
