@@ -42,7 +42,7 @@ def compared(labels: tuple[str, ...], paper: float, here: Spread | float, *, why
     measured = here if isinstance(here, Spread) else Spread(here, math.nan)
     varies = measured.sd > ROUNDING * max(abs(paper), abs(measured.mean))
     z = (measured.mean - paper) / measured.sd if varies else math.nan
-    return Row(labels, paper, here, z, _verdict(paper, measured, z, why))
+    return Row(labels, paper, here, z=z, verdict=_verdict(paper, measured, z, why))
 
 
 def left_open(labels: tuple[str, ...], paper: float, here: Spread, *, why: str) -> Row:
@@ -54,17 +54,17 @@ def left_open(labels: tuple[str, ...], paper: float, here: Spread, *, why: str) 
 def stated(labels: tuple[str, ...], paper: str, here: Cell, *, holds: bool | None, why: str = UNEXPLAINED) -> Row:
     """A statement of the paper in words; ``holds`` says whether it is true here, None that it is undecided."""
     verdict = REPRODUCED if holds else _with(UNDECIDED if holds is None else NOT_REPRODUCED, why)
-    return Row(labels, paper, here, NOTHING, verdict)
+    return Row(labels, paper, here, z=NOTHING, verdict=verdict)
 
 
 def trend_stated(labels: tuple[str, ...], paper: str, here: Cell, *, holds: bool, why: str) -> Row:
     """A statement in words that holds here in direction, not in size (``why`` states the difference)."""
-    return Row(labels, paper, here, NOTHING, _with(SAME_TREND if holds else NOT_REPRODUCED, why))
+    return Row(labels, paper, here, z=NOTHING, verdict=_with(SAME_TREND if holds else NOT_REPRODUCED, why))
 
 
 def ours(labels: tuple[str, ...], here: Cell) -> Row:
     """A number that the paper does not give."""
-    return Row(labels, NOTHING, here, NOTHING, NOTHING)
+    return Row(labels, NOTHING, here, z=NOTHING, verdict=NOTHING)
 
 
 def table(name: str, title: str, titles: Sequence[str], rows: Iterable[Row], form: str = ".3g") -> Table:
