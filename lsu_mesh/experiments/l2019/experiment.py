@@ -54,7 +54,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
     priors = by_prior(THIN_LEVELS, job, part(watch, 0.9, 0.94))
     rows = [*claims(surfaces, wrongly_widened(seed, few, steps, part(watch, 0.94, 0.97))), *rows_of_priors(priors)]
     if steps >= STEPS:
-        rows.append(of_seeds(ratios(seed, runs, steps, part(watch, 0.97, 1.0))))
+        rows += of_seeds(ratios(seed, runs, steps, part(watch, 0.97, 1.0)))
     drawn, captions = figures(surfaces)
     tables = [
         table("l2019-statements", STATEMENTS, ["system", "criterion"], rows),

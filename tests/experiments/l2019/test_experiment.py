@@ -129,9 +129,10 @@ def test_seeds_below_the_range_are_named() -> None:
     job = Job("S2", 0.1, (0.1,), 4, 60, 2)
     found = criteria(job)
     assert ratio(job) == pytest.approx(found["LSUO", "T outputs"].mean() / found["LSUP", "T outputs"].mean(), rel=1e-12)
-    assert of_seeds({1: 76.0, 2: 90.0}).verdict == "reproduced"
-    told = of_seeds({1: 76.0, 2: 61.0, 3: 54.0}).verdict
-    assert told.startswith("not reproduced: seeds 2, 3 are below 75, down to 54;")
+    reproduced, below = of_seeds({1: 76.0, 2: 90.0})
+    assert (reproduced.verdict, below.here) == ("reproduced", "none")
+    low, below = of_seeds({1: 60.0, 2: 41.0, 3: 34.0})
+    assert (low.verdict, below.here) == ("not reproduced: unexplained", "1, 2, 3, down to 34")
 
 
 def test_of_the_measured_position_alone_both_sentences_on_s2_hold() -> None:
