@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from lsu_mesh.experiments.comparison import FAR, NEAR, SHARE, VERDICTS, count
 from lsu_mesh.experiments.outcome import Outcome
 
-WHOLE = 80
+WHOLE = 90
 """Rows up to which a table stands on the page; a longer one is only written as a file."""
 
 
