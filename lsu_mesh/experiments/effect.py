@@ -20,5 +20,10 @@ class Effect(NamedTuple):
         logs = np.log(values)
         return cls(float(np.exp((logs[-1] - logs[0]).mean())), float(np.exp((logs[:, -1] - logs[:, 0]).mean())))
 
+    @staticmethod
+    def difference(values: NDArray[np.float64]) -> Effect:
+        """By how much, instead of by which factor, it grows: means over the other noise."""
+        return Effect(float((values[-1] - values[0]).mean()), float((values[:, -1] - values[:, 0]).mean()))
+
     def __str__(self) -> str:
         return f"× {self.rho:.3g} by ρ, × {self.r:.3g} by r"

@@ -15,6 +15,7 @@ import numpy as np
 
 from lsu_mesh import systems
 from lsu_mesh.array_types import Vector
+from lsu_mesh.experiments.centre import CENTRE
 from lsu_mesh.experiments.outcome import Check, Column, Outcome, Table, percent
 from lsu_mesh.experiments.workers import Watch, spread, unwatched
 from lsu_mesh.filters.filter import Filter
@@ -35,10 +36,10 @@ C = ((1.0, 0.0, 0.5), (0.0, 1.0, 0.5), (1.0, -1.0, 0.3))
 PRIOR = Orthotope([-5.0] * 3, [5.0] * 3)
 X1 = (1.0, 0.5, -0.5)
 KINDS: Mapping[str, Make] = {
-    "LSUO": lambda model, prior: LSUO(model, prior),
-    "LSUP image": lambda model, prior: LSUP(model, prior),
-    "LSUPB": lambda model, prior: LSUPB(model, prior),
-    "LSUCZ": lambda model, prior: LSUCZ(model, prior),
+    "LSUO": lambda model, prior: LSUO(model, prior, **CENTRE),
+    "LSUP image": lambda model, prior: LSUP(model, prior, **CENTRE),
+    "LSUPB": lambda model, prior: LSUPB(model, prior, **CENTRE),
+    "LSUCZ": lambda model, prior: LSUCZ(model, prior, **CENTRE),
 }
 FEEDBACKS = ("none", "next step", "same step")
 WARM_UP = 10
@@ -47,7 +48,8 @@ TITLE = "Fusion of three filters on P3 and Bayesian transfer, experiments of thi
 NOTES = (
     "P3 with one filter per sensor: each alone, their fusion with and without feedback, and the filter of the same "
     "class that has all sensors (*central*). Below it, transfer of a source's prediction to a target over the noise of "
-    "the source, after Kuklišová Pavelková, Jirsa, Quinn (2022)."
+    "the source, after Kuklišová Pavelková, Jirsa, Quinn (2022). LSUP keeps the parallelotope of least volume. A "
+    "transfer shrinks its volume, and may widen its hull; LSUPB keeps both small."
 )
 VOLUME_EVERY = 5
 """The volume of the fused support, an exact polytope, is measured at every fifth step."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from lsu_mesh.experiments.comparison import DEVIATIONS, SHARE, VERDICTS, count
+from lsu_mesh.experiments.comparison import FAR, NEAR, SHARE, VERDICTS, count
 from lsu_mesh.experiments.outcome import Outcome
 
-WHOLE = 80
+WHOLE = 90
 """Rows up to which a table stands on the page; a longer one is only written as a file."""
 
 
@@ -25,19 +25,30 @@ def _opening(command: str) -> str:
         f"Written by `{command}`; of the numbers only the column *paper* is typed in. Each part can be run alone, such "
         "as `lsu-mesh reproduce l2019`; `--quick` is a small version, `--out DIR` writes tables and figures as CSV, "
         "Markdown and PNG files. Two runs with one seed give the same numbers, but for measured times.\n\n"
-        "**Verdicts** come from a rule. *Reproduced*: ours differs from the paper's number by at most "
-        f"{DEVIATIONS:.0f} standard deviations of a single run, or by at most {100 * SHARE:.0f} % (where the paper "
-        "makes a statement in words: it is true here). *Same trend*: the size differs, what the paper concludes from "
-        "it holds. *Not reproduced* ends with the reason. *Here* is mean ± standard deviation over runs; rows without "
-        "a number of the paper are filters or options that it did not have."
+        "**Verdicts** come from a rule. *Here* is mean ± standard deviation over runs, and z is the distance to the "
+        "paper's number in standard deviations of a single run.\n\n"
+        f"- A number is *reproduced* if |z| ≤ {NEAR:.0f}, or if it differs by at most {100 * SHARE:.0f} %. It is "
+        f"*undecided* up to |z| = {FAR:.0f}. Beyond that, or where one run gives no z, it is a *deviation*.\n"
+        "- A statement in words is *reproduced* if it is true here. It is *same trend* if its direction is true and "
+        "its size is not. It is *undecided* if the answer depends on what the paper leaves open. Else it is *not "
+        "reproduced*.\n"
+        "- A deviation, and what is not reproduced, ends with a reason. The reason was computed by the run that wrote "
+        "this page, or it says *unexplained*. A deviation can come from an error here as well as from one there.\n\n"
+        "Rows without a number of the paper are filters, options or tests that it did not have."
     )
 
 
 def _summary(outcomes: Mapping[str, Outcome]) -> str:
-    lines = ["| | what | " + " | ".join(VERDICTS) + " | checks met |", "| :-- | :-- | --: | --: | --: | --: |"]
+    titles = ["", "what", *VERDICTS, "checks met"]
+    rules = [":--", ":--", *["--:"] * (len(titles) - 2)]
+    lines = [f"| {' | '.join(cells)} |" for cells in (titles, rules)]
     for what, outcome in outcomes.items():
         counts = count(outcome.tables)
-        numbers = " | ".join(str(counts[verdict]) for verdict in VERDICTS) if sum(counts.values()) else "– | – | –"
+        numbers = (
+            " | ".join(str(counts[verdict]) for verdict in VERDICTS)
+            if sum(counts.values())
+            else " | ".join("–" * len(VERDICTS))
+        )
         met = f"{sum(check.is_met for check in outcome.checks)} of {len(outcome.checks)}"
         lines.append(f"| [{what}](#{what}) | {outcome.title or what} | {numbers} | {met} |")
     return "\n".join(lines)

@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-STYLES = {"LSUO lp": ("#d1495b", "^"), "LSUP": ("#2f5d50", "v"), "LSUPB": ("#1a1a1a", "o"), "LSUCZ": ("#8fa3d8", "s")}
+STYLES = {"LSUO lp": ("#d1495b", "^"), "LSUP": ("#3c9d6b", "v"), "LSUPB": ("#1a1a1a", "o"), "LSUCZ": ("#8fa3d8", "s")}
 """Colour, of another grey each, and mark by filter."""
 PANELS: Sequence[tuple[str, Callable[[Result], float]]] = (
     ("width ÷ isolated", lambda result: result.width),
     ("TNSE ÷ isolated", lambda result: result.tnse_ratio),
-    ("gain, nats", lambda result: result.gain),
+    ("gain of hulls, nats", lambda result: result.gain),
     ("truth inside, %", lambda result: 100.0 * result.inside),
 )
 

@@ -23,6 +23,8 @@ class Result(NamedTuple):
     """Total norm-squared error of all steps and seeds; ``tnse_ratio`` is to that of the isolated filter."""
     tnse_ratio: float
     gain: float
+    """Mean nats by the hulls; ``support_gain`` by the supports."""
+    support_gain: float
     inside: float
     rejected: float
     restarts: float

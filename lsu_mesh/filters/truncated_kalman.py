@@ -72,6 +72,11 @@ class TruncatedKalman(Kalman):
         inside = np.clip(self._held.mean, lower, upper)
         return inside if self._box is None else np.clip(inside, *self._box)
 
+    @property
+    def untruncated(self) -> Gaussian:
+        """The density before the truncation of the last data update."""
+        return self._full
+
     def update(
         self,
         y: ArrayLike,

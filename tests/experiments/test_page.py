@@ -20,7 +20,7 @@ def test_a_section_has_everything_in_order() -> None:
         errata=["(1) should be (2)."],
     )
     text = page({"t2018": outcome}, "lsu-mesh reproduce all", "papers")
-    assert "| [t2018](#t2018) | A paper | 1 | 0 | 0 | 1 of 1 |" in text
+    assert "| [t2018](#t2018) | A paper | 1 | 0 | 0 | 0 | 0 | 1 of 1 |" in text
     parts = (
         "# The papers, reproduced", "## t2018", "**A paper.**", "Its setting.", "A title", "| reproduced |",
         "![t-figure](papers/t-figure.png)", "*What it shows*", "- met: width = 1 (at most 2)", "- (1) should be (2).",

@@ -106,6 +106,7 @@ def test_without_feedback_the_recursion_is_the_plain_filter() -> None:
     for y, u in zip(*simulate(P3, 20, 1)[1:], strict=True):
         plain.update(y)
         truncating.update(y)
+        np.testing.assert_array_equal(truncating.untruncated.covariance, plain.covariance)
         plain.predict(u)
         truncating.predict(u)
         np.testing.assert_array_equal(plain.covariance, truncating.covariance)

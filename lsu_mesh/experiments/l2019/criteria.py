@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lsu_mesh import systems
-from lsu_mesh.array_types import Vector
+from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.experiments.centre import CENTRE
 from lsu_mesh.experiments.monte_carlo import Draws, draw, simulate_all
 from lsu_mesh.filters.bank import FilterBank
 from lsu_mesh.filters.compiled import CompiledFilter
@@ -34,14 +35,16 @@ START = 2.0
 TRANSIENT = 50
 """Steps that do not count for volumes and lengths, which else show the prior."""
 KINDS: Mapping[str, tuple[type[CompiledFilter], Mapping[str, object]]] = {
-    "LSUO": (LSUO, {"meet": False}),
-    "LSUP": (LSUP, {"time_update": "image", "box": False}),
-    "LSUO, met with the prediction": (LSUO, {}),
-    "LSUP, strips": (LSUP, {"time_update": "strips", "box": False}),
-    "LSUPB": (LSUPB, {}),
+    "LSUO": (LSUO, {"meet": False, **CENTRE}),
+    "LSUP": (LSUP, {"time_update": "image", "box": False, **CENTRE}),
+    "LSUO, met with the prediction": (LSUO, {**CENTRE}),
+    "LSUP, strips": (LSUP, {"time_update": "strips", "box": False, **CENTRE}),
+    "LSUPB": (LSUPB, {**CENTRE}),
 }
 """The report's two, then ours."""
 OF_A_FILTER = ("T states", "T outputs", "V", "L", "P states outside", "P outputs outside")
+MEASURED, LAST_LENGTH = "T measured", "L, last tenth"
+"""Error of C x̂ as an estimate of C x, which for S2 is the position; L over the last tenth of the steps."""
 OF_THE_PAIR = ("P5", "P6", "P7", "P8", "P10")
 SETTLED = "T outputs, settled"
 WITHOUT_INPUT = "T outputs, settled, B u left out"
@@ -57,6 +60,7 @@ class Job(NamedTuple):
     runs: int
     steps: int
     seed: int
+    start: float = START
 
     def models(self) -> list[LSUModel]:
         """One model per output noise."""
@@ -70,13 +74,13 @@ class Job(NamedTuple):
 def criteria(job: Job) -> dict[tuple[str, str], PerRun]:
     """By filter and criterion; those of the pair stand under the filter ``""``."""
     models = job.models()
-    data = simulate_all(models, job.draws(), START)
+    data = simulate_all(models, job.draws(), job.start)
     shape = (len(models), job.runs)
     found: dict[tuple[str, str], PerRun] = {}
     kept: dict[str, FilterRun] = {}
     for name, (kind, options) in KINDS.items():
         record = run_bank(kind, options, models, runs=job.runs, data=data)
-        for criterion, values in of_a_filter(record, data).items():
+        for criterion, values in of_a_filter(record, data, models[0].C).items():
             found[name, criterion] = values.reshape(shape)
         if name in ("LSUO", "LSUP"):
             kept[name] = record
@@ -90,35 +94,40 @@ def criteria(job: Job) -> dict[tuple[str, str], PerRun]:
 def with_zonotopes(job: Job) -> dict[tuple[str, str], PerRun]:
     """The criteria of single filters, those of LSUCZ as well, over few and short runs."""
     models = job.models()
-    data = simulate_all(models, job.draws(), START)
+    data = simulate_all(models, job.draws(), job.start)
     shape = (len(models), job.runs)
     records = {name: run_bank(*KINDS[name], models, job.runs, data) for name in KINDS}
     records[CZ] = _one_by_one(models, job.runs, data)
     return {
         (name, criterion): values.reshape(shape)
         for name, record in records.items()
-        for criterion, values in of_a_filter(record, data).items()
+        for criterion, values in of_a_filter(record, data, models[0].C).items()
     }
 
 
 def run_bank(
-    kind: type[CompiledFilter], options: Mapping[str, object], models: Sequence[LSUModel], runs: int, data: Simulation
+    kind: type[CompiledFilter],
+    options: Mapping[str, object],
+    models: Sequence[LSUModel],
+    runs: int,
+    data: Simulation,
+    start: float = START,
 ) -> FilterRun:
     """All runs of all models through one bank, from the prior box."""
     every = [model for model in models for _ in range(runs)]
-    priors = [prior(models[0])] * len(every)
-    record, done = FilterBank(kind, every, priors, threads=1, point="centre", **options).run(data.Y, data.U)
+    priors = [prior(models[0], start)] * len(every)
+    record, done = FilterBank(kind, every, priors, threads=1, **options).run(data.Y, data.U)
     if (done < data.Y.shape[1]).any():
         raise AssertionError(f"{kind.__name__}: data that fulfil the bounds contradict the set")
     return record
 
 
-def prior(model: LSUModel) -> Orthotope:
+def prior(model: LSUModel, start: float = START) -> Orthotope:
     """The box that x_1 is drawn from."""
-    return Orthotope([-START] * model.state_count, [START] * model.state_count)
+    return Orthotope([-start] * model.state_count, [start] * model.state_count)
 
 
-def of_a_filter(record: FilterRun, data: Simulation) -> dict[str, PerRun]:
+def of_a_filter(record: FilterRun, data: Simulation, C: Matrix) -> dict[str, PerRun]:
     """One number per instance, (N,)."""
     late = _late(data)
     outside_x = ((record.lower > data.X) | (record.upper < data.X)).any(axis=2)
@@ -130,8 +139,10 @@ def of_a_filter(record: FilterRun, data: Simulation) -> dict[str, PerRun]:
         (record.y_upper - record.y_lower)[:, late].mean(axis=(1, 2)),
         100.0 * outside_x.mean(axis=1),
         100.0 * outside_y.mean(axis=1),
+        np.square((record.points - data.X) @ C.T).sum(axis=(1, 2)),
+        (record.y_upper - record.y_lower)[:, -(data.X.shape[1] // 10) :].mean(axis=(1, 2)),
     )
-    return dict(zip(OF_A_FILTER, values, strict=True))
+    return dict(zip((*OF_A_FILTER, MEASURED, LAST_LENGTH), values, strict=True))
 
 
 def of_the_pair(box: FilterRun, body: FilterRun) -> dict[str, PerRun]:
@@ -169,7 +180,7 @@ def _late(data: Simulation) -> slice:
 def _one_by_one(models: Sequence[LSUModel], runs: int, data: Simulation) -> FilterRun:
     """LSUCZ has no bank."""
     records = [
-        run_filter(LSUCZ(model, prior(model)), data.Y[i * runs + run], data.U[i * runs + run])
+        run_filter(LSUCZ(model, prior(model), **CENTRE), data.Y[i * runs + run], data.U[i * runs + run])
         for i, model in enumerate(models)
         for run in range(runs)
     ]

@@ -58,7 +58,7 @@ def run(quick: bool = False, seed: int = 1, watch: Watch = unwatched) -> Outcome
         ),
         stated(
             ("Figure 1", "half-ranges over time"), "a figure", "other systems",
-            holds=False,
+            holds=None,
             why="the paper gives no matrices; the figures below show S2 and S3, also with two states and one output",
         ),
     ]  # fmt: skip

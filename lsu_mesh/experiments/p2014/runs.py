@@ -9,6 +9,7 @@ import numpy as np
 
 from lsu_mesh.array_types import Array, Flags
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.kalman import Kalman
 from lsu_mesh.filters.truncated_kalman import TruncatedKalman
 from lsu_mesh.filters.window.program import Selected
 from lsu_mesh.filters.window.window_map import WindowMAP
@@ -26,6 +27,9 @@ UNKNOWN = tuple((matrix, i, j, -1.0, 1.0) for matrix, i, j in (("E", 1, 2), ("E"
 KAPPAS = (1.0, 1.5, 2.0)
 KALMAN_SKIPS = 25
 """Steps of the Kalman filters that do not count, as those of the longer window of Tables II and III."""
+
+SETTLED = 100
+"""Steps after which the covariance of a Kalman filter without truncation no longer changes."""
 
 
 class Case(NamedTuple):
@@ -59,8 +63,9 @@ class Result(NamedTuple):
 
     ``states`` (3,), ``fits`` (2,), ``predictions`` (2,): mean absolute errors of states, of outputs that the estimate
     has seen, and of outputs before it has. ``volume``: V, or V_KF. ``outside`` (3,): N, or N_KF with κ³ as printed, in
-    %, for κ = 1, 1.5, 2. ``other`` (3,): the share of single coordinates outside, or N_KF with κ². ``ellipsoid``: the
-    volume that P gives, 4/3 π √|P|. ``seconds``: of a step.
+    %, for κ = 1, 1.5, 2. ``other`` (3,): the share of single coordinates outside, or N_KF with κ². ``untruncated``
+    (3,): as ``outside`` with the P before its truncation; NaN for a window. ``ellipsoid``: the volume that P gives,
+    4/3 π √|P|. ``seconds``: of a step.
     """
 
     states: Array
@@ -69,6 +74,7 @@ class Result(NamedTuple):
     volume: float
     outside: Array
     other: Array
+    untruncated: Array
     ellipsoid: float
     seconds: float
 
@@ -102,7 +108,7 @@ def result(job: Job) -> Result:
     filter = estimator(job)
     first = (job.window or KALMAN_SKIPS) + 1
     errors: list[tuple[Array, Array, Array]] = []
-    sizes: list[tuple[float, Shares, Shares]] = []
+    sizes: list[tuple[float, Shares, Shares, Shares]] = []
     seconds = 0.0
     for t in range(job.steps + 1):
         predicted = filter.predict_output().point
@@ -119,7 +125,7 @@ def result(job: Job) -> Result:
         seconds += time.process_time() - began
     states, fits, predictions = (np.mean(column, axis=0) for column in zip(*errors, strict=True))
     volumes, *who = zip(*sizes, strict=True)
-    outside, other = (100.0 * np.mean(column, axis=0) for column in who)
+    outside, other, untruncated = (100.0 * np.mean(column, axis=0) for column in who)
     ellipsoid = np.nan if job.window else 4.0 / 3.0 * np.pi * float(np.mean(np.sqrt(volumes)))
     return Result(
         states=states,
@@ -128,20 +134,38 @@ def result(job: Job) -> Result:
         volume=float(np.mean(volumes)),
         outside=outside,
         other=other,
+        untruncated=untruncated,
         ellipsoid=ellipsoid,
         seconds=seconds / (job.steps + 1),
     )
 
 
-def _size(filter: Filter, X: Array, t: int, window: int) -> tuple[float, Shares, Shares]:
-    """Volume, who is outside for each κ, and the share of coordinates (or with κ²); of x_{t−Δ}, or of x_t."""
+def _size(filter: Filter, X: Array, t: int, window: int) -> tuple[float, Shares, Shares, Shares]:
+    """Volume, who is outside for each κ, the share of coordinates (or with κ²), and with P before its truncation.
+
+    Of x_{t−Δ}, or of x_t.
+    """
     kappas = np.array(KAPPAS)
     if isinstance(filter, WindowMAP):
         lower, upper = filter.interval_estimates(1.0, met=False)
         middle, half = 0.5 * (lower[1] + upper[1]), 0.5 * (upper[1] - lower[1])
         is_outside = np.abs(X[t - window] - middle) > kappas[:, np.newaxis] * half
-        return float(np.prod(2.0 * half)), is_outside.any(axis=1), is_outside.mean(axis=1)
+        nothing = np.full(len(KAPPAS), np.nan)
+        return float(np.prod(2.0 * half)), is_outside.any(axis=1), is_outside.mean(axis=1), nothing
     assert isinstance(filter, TruncatedKalman)
     P, error = filter.covariance, X[t] - filter.point
-    distance = float(error @ np.linalg.solve(P, error))
-    return float(np.linalg.det(P)), np.asarray(distance > kappas**3), np.asarray(distance > kappas**2)
+    distance, wider = (float(error @ np.linalg.solve(S, error)) for S in (P, filter.untruncated.covariance))
+    shares = (np.asarray(far) for far in (distance > kappas**3, distance > kappas**2, wider > kappas**3))
+    over, over_squared, over_untruncated = shares
+    return float(np.linalg.det(P)), over, over_squared, over_untruncated
+
+
+def untruncated_determinant(factor: float) -> float:
+    """det P of the Kalman filter without truncation once it has settled; no data change it."""
+    size, box = np.sqrt(factor), (LOWER, UPPER)
+    filter = Kalman(LSUModel(A=A, B=B, C=C, rho=size * RHO, r=size * R), box)
+    for _ in range(SETTLED):
+        filter.update(np.zeros(len(C)))
+        filter.predict(np.zeros(1))
+    filter.update(np.zeros(len(C)))
+    return float(np.linalg.det(filter.covariance))

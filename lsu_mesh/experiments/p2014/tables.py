@@ -6,9 +6,17 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from lsu_mesh.experiments.comparison import Row, compared, ours, stated, table
+from lsu_mesh.experiments.comparison import UNEXPLAINED, Row, compared, ours, stated, table, trend_stated
 from lsu_mesh.experiments.outcome import SPREAD, Cell, Column, Spread, Table
-from lsu_mesh.experiments.p2014.runs import CORRELATED, KAPPAS, KNOWN, UNCORRELATED, Case, Result
+from lsu_mesh.experiments.p2014.runs import (
+    CORRELATED,
+    KAPPAS,
+    KNOWN,
+    UNCORRELATED,
+    Case,
+    Result,
+    untruncated_determinant,
+)
 
 Found = Mapping[tuple[str, Case], Sequence[Result]]
 """The runs by estimator and case."""
@@ -29,14 +37,21 @@ TABLE_I = {
 WELL = "truncated Kalman"
 THRICE = "truncated Kalman, variances × 3"
 NINEFOLD = "truncated Kalman, half-widths × 3"
-KALMAN = {WELL: 1.0, THRICE: 3.0, NINEFOLD: 9.0}
-"""By what the variances of the Kalman filters are multiplied; the last two are readings of *three times higher*."""
+FITTED_WELL = "truncated Kalman, fitted: variances 2 h²/3"
+FITTED_WRONG = "truncated Kalman, fitted: variances 20 h²/3"
+KALMAN = {WELL: 1.0, THRICE: 3.0, NINEFOLD: 9.0, FITTED_WELL: 2.0, FITTED_WRONG: 20.0}
+"""By what the variances h²/3 of the Kalman filters are multiplied. THRICE and NINEFOLD are readings of *three times
+higher*. The fitted ones were found from the two values of V_KF in Table III: det P goes with the cube of the factor."""
+NEARER = {WELL: FITTED_WELL, THRICE: FITTED_WRONG, NINEFOLD: FITTED_WRONG}
+"""The fitted reading of each literal one."""
 TABLE_II = {
     "window 5": (0.15, 0.10, 0.06, 0.10, 0.10),
     "window 25": (0.09, 0.07, 0.05, 0.13, 0.11),
     WELL: (0.07, 0.06, 0.05, 0.13, 0.15),
     THRICE: (0.10, 0.11, 0.08, 0.50, 0.51),
     NINEFOLD: (0.10, 0.11, 0.08, 0.50, 0.51),
+    FITTED_WELL: (0.07, 0.06, 0.05, 0.13, 0.15),
+    FITTED_WRONG: (0.10, 0.11, 0.08, 0.50, 0.51),
 }
 """Mean absolute errors of three states and two outputs."""
 TABLE_III = {
@@ -45,11 +60,13 @@ TABLE_III = {
     WELL: (7.1e-7, 67, 9, 1),
     THRICE: (7.1e-4, 10, 1, 0),
     NINEFOLD: (7.1e-4, 10, 1, 0),
+    FITTED_WELL: (7.1e-7, 67, 9, 1),
+    FITTED_WRONG: (7.1e-4, 10, 1, 0),
 }
 """V or V_KF, and N or N_KF in % for κ = 1, 1.5, 2."""
 CASES = {CORRELATED: "correlated, E and F estimated", UNCORRELATED: "E = F = I, estimated", KNOWN: "E = F = I, known"}
-CONTRADICTORY = "a wrong scale hardly moves the gain, and outputs cannot be five times worse where states are not"
-DETERMINANT = "a determinant is no volume; that of the ellipsoid is"
+SATURATED = 1.25
+"""Factor up to which a longer window has changed nothing."""
 NEAR = 1.5
 """Factor up to which the errors of two estimators are about the same."""
 
@@ -67,22 +84,11 @@ def performance(found: Found) -> Table:
             runs = found.get((window(length, point), CORRELATED))
             if runs is not None:
                 labels = (str(length), point)
-                rows += _size(
-                    labels, "V · 1e3", volume, here=[1e3 * run.volume for run in runs], trend=_shrinks(found, length)
-                )
+                here = Spread.of([1e3 * run.volume for run in runs])
+                rows.append(compared((*labels, "V · 1e3"), volume, here))
                 rows += _outside(labels, outside, runs) if point == "centre" else ()
     title = "Table I: correlated noise, E and F estimated, by window length Δ"
     return table("p2014-table-1", title, ["Δ", "point", "quantity"], rows)
-
-
-def _size(labels: tuple[str, ...], what: str, paper: float, here: list[float], trend: bool) -> Iterator[Row]:
-    yield compared((*labels, what), paper, Spread.of(here), trend=trend)
-
-
-def _shrinks(found: Found, length: int) -> bool:
-    """Whether V falls with the window: it does so from Δ = 5 to this one, or from 5 to 25."""
-    longer = found[window(25 if length == 5 else length, "centre"), CORRELATED]
-    return _mean(longer, "volume") < _mean(found[window(5, "centre"), CORRELATED], "volume")
 
 
 def _outside(labels: tuple[str, ...], paper: Sequence[float], runs: Sequence[Result]) -> Iterator[Row]:
@@ -91,7 +97,7 @@ def _outside(labels: tuple[str, ...], paper: Sequence[float], runs: Sequence[Res
         single = np.mean([run.other[i] for run in runs])
         yield compared(
             (*labels, f"N, κ = {kappa:g}, %"), paper[i], Spread.of([run.outside[i] for run in runs]),
-            why=f"any of three coordinates counts, of single ones {single:.3g} %",
+            why=f"unexplained; of single coordinates {single:.3g} %",
         )  # fmt: skip
 
 
@@ -101,25 +107,24 @@ def errors(found: Found) -> Table:
     for name, paper in TABLE_II.items():
         for key in _names(name):
             runs = found[key, _case(name)]
-            trend, why = _trend(found, name), CONTRADICTORY if name in (THRICE, NINEFOLD) else ""
-            for i in range(3):
-                here = Spread.of([run.states[i] for run in runs])
-                rows.append(compared((key, f"x{i + 1}"), paper[i], here, trend=trend, why=why))
-            for i in range(2):
-                here = Spread.of([run.fits[i] for run in runs])
-                rows.append(compared((key, f"y{i + 1}, fit"), paper[3 + i], here, trend=trend, why=why))
+            labels = [f"x{i + 1}" for i in range(3)] + [f"y{i + 1}, fit" for i in range(2)]
+            for i, label in enumerate(labels):
+                here = _errors(runs, i)
+                rows.append(compared((key, label), paper[i], here, why=_fitted_error(found, name, i)))
     title = "Table II: mean absolute errors with E = F = I, which the window estimator has to find"
     return table("p2014-table-2", title, ["estimator", "of"], rows)
 
 
-def _trend(found: Found, name: str) -> bool | None:
-    """What the paper concludes: a longer window is better, and about as good as a well set Kalman filter."""
-    if name in (THRICE, NINEFOLD):
-        return None
-    short, long = (_mean(found[window(length, "centre"), UNCORRELATED], "states") for length in (5, 25))
-    if name == "window 5":
-        return bool(long < short)
-    return bool(long < NEAR * _mean(found[WELL, KNOWN], "states"))
+def _errors(runs: Sequence[Result], i: int) -> Spread:
+    """Of state i, or of output i − 3."""
+    return Spread.of([(*run.states, *run.fits)[i] for run in runs])
+
+
+def _fitted_error(found: Found, name: str, i: int) -> str:
+    """What the fitted reading gives for a state; the outputs it explains no better."""
+    if name not in NEARER or i >= 3:
+        return UNEXPLAINED
+    return f"the fitted variances give {_errors(found[NEARER[name], KNOWN], i).mean:.3g}"
 
 
 def confidence(found: Found) -> Table:
@@ -131,40 +136,62 @@ def confidence(found: Found) -> Table:
             if name in KALMAN:
                 rows += _ellipsoid(key, size, outside, runs)
             else:
-                shrinks = _mean(found[window(25, "centre"), UNCORRELATED], "volume") < _mean(
-                    found[window(5, "centre"), UNCORRELATED], "volume"
-                )
-                rows += _size((key,), "V · 1e3", 1e3 * size, here=[1e3 * run.volume for run in runs], trend=shrinks)
+                here = Spread.of([1e3 * run.volume for run in runs])
+                rows.append(compared((key, "V · 1e3"), 1e3 * size, here))
                 rows += _outside((key,), outside, runs) if key.endswith("centre") else ()
-    rows.append(_growth(found))
     title = "Table III: volumes and shares of states outside, with E = F = I, which the window estimator has to find"
     return table("p2014-table-3", title, ["estimator", "quantity"], rows)
 
 
 def _ellipsoid(key: str, size: float, outside: Sequence[float], runs: Sequence[Result]) -> Iterator[Row]:
-    volume = Spread.of([1e3 * run.ellipsoid for run in runs])
-    determinant = Spread.of([1e7 * run.volume for run in runs])
-    yield compared(
-        (key, "V_KF = mean of det P, · 1e7"), 1e7 * size, determinant, why=f"{DETERMINANT} {1e-3 * volume.mean:.2g}"
-    )
+    literal, fitted = Spread.of([1e7 * run.volume for run in runs]), 1e7 * untruncated_determinant(KALMAN[key])
+    near = 1e7 * untruncated_determinant(KALMAN[NEARER.get(key, key)])
+    why = f"the fitted variances give {near:.4g} without truncation"
+    if key in NEARER:
+        yield compared((key, "V_KF = mean of det P, · 1e7"), 1e7 * size, literal, why=why)
+        yield ours((key, "det P without truncation, · 1e7"), fitted)
+    else:
+        yield compared((key, "V_KF = det P without truncation, · 1e7"), 1e7 * size, fitted)
+        yield ours((key, "mean of det P, · 1e7"), literal)
     for i, kappa in enumerate(KAPPAS):
-        yield compared(
-            (key, f"N_KF, κ = {kappa:g}, %"), outside[i], Spread.of([run.outside[i] for run in runs]),
-            why="" if kappa == 1.0 else f"{np.mean([run.other[i] for run in runs]):.3g} % with κ²",
-        )  # fmt: skip
+        squared = "" if kappa == 1.0 else f"; {np.mean([run.other[i] for run in runs]):.3g} % with κ²"
+        here, wider = (Spread.of([getattr(run, what)[i] for run in runs]) for what in ("outside", "untruncated"))
+        yield compared((key, f"N_KF, κ = {kappa:g}, %"), outside[i], here, why=f"{UNEXPLAINED}{squared}")
+        if key not in NEARER:
+            yield compared((key, f"N_KF, κ = {kappa:g}, P before its truncation, %"), outside[i], wider)
+    volume = Spread.of([1e3 * run.ellipsoid for run in runs])
     yield ours((key, "volume of the ellipsoid with κ = 1, 4/3 π √det P, · 1e3"), volume)
 
 
-def _growth(found: Found) -> Row:
-    """By what the wrong scale multiplies V_KF."""
-    well, thrice, ninefold = (_mean(found[name, KNOWN], "volume") for name in KALMAN)
-    paper = TABLE_III[THRICE][0] / TABLE_III[WELL][0]
-    return stated(
-        ("V_KF, incorrect ÷ well set", "factor"), f"{paper:.0f}",
-        f"{thrice / well:.3g} with variances × 3, {ninefold / well:.3g} with half-widths × 3",
-        holds=abs(ninefold / well - paper) < 0.1 * paper,
-        why="without truncation the factors are 27 and 729",
-    )  # fmt: skip
+def statements(found: Found) -> Table:
+    """What section 6 concludes, in direction."""
+    rows: list[Row] = []
+    for case in (CORRELATED, UNCORRELATED):
+        short, long = (found[window(length, "centre"), case] for length in (5, 25))
+        for what, label in (("volume", "V"), ("states", "errors of the states, mean")):
+            ratio = _mean(long, what) / _mean(short, what)
+            rows.append(stated((f"Δ = 25 ÷ Δ = 5, {CASES[case]}", label), "smaller", ratio, holds=ratio < 1.0))
+    longest = [found[window(length, "centre"), CORRELATED] for length in (25, 50)]
+    for what, label in (("volume", "V"), ("states", "errors of the states, mean")):
+        ratio = _mean(longest[1], what) / _mean(longest[0], what)
+        rows.append(
+            stated(("Δ = 50 ÷ Δ = 25", label), "about the same", ratio, holds=1.0 / SATURATED < ratio < SATURATED)
+        )
+    ratio = _mean(found[window(25, "centre"), UNCORRELATED], "states") / _mean(found[WELL, KNOWN], "states")
+    rows.append(
+        stated(("Δ = 25 ÷ well set Kalman", "errors of the states, mean"), "about the same", ratio, holds=ratio < NEAR)
+    )
+    for name in (THRICE, NINEFOLD, FITTED_WRONG):
+        ratio = _mean(found[name, KNOWN], "states") / _mean(found[WELL, KNOWN], "states")
+        rows.append(stated((f"{name} ÷ well set", "errors of the states, mean"), "worse", ratio, holds=ratio > 1.0))
+        ratio = _mean(found[name, KNOWN], "fits") / _mean(found[WELL, KNOWN], "fits")
+        rows.append(
+            trend_stated(
+                (f"{name} ÷ well set", "errors of the outputs, mean"), "3.6 times", ratio, holds=ratio > 1.0,
+                why=UNEXPLAINED,
+            )
+        )  # fmt: skip
+    return table("p2014-statements", "What the paper concludes (section 6.4)", ["about", "quantity"], rows)
 
 
 def points(found: Found) -> Table:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from lsu_mesh.array_types import Array
+from lsu_mesh.experiments.centre import CENTRE
 from lsu_mesh.experiments.outcome import Cell, Column, Table
 from lsu_mesh.experiments.p2018.runs import data_of, prior
 from lsu_mesh.filters.lsuo import LSUO
@@ -39,7 +40,7 @@ class States(NamedTuple):
 def states(seed: int) -> States:
     """A part of one run."""
     model, data = data_of(seed, LAST)
-    record = run_filter(LSUO(model, prior(model), meet=False, point="centre"), data.Y, data.U)
+    record = run_filter(LSUO(model, prior(model), meet=False, **CENTRE), data.Y, data.U)
     shown = slice(FIRST - 1, LAST)
     return States(*(values[shown] for values in (data.X, record.points, record.lower, record.upper)))
 

@@ -9,7 +9,16 @@ from scipy.linalg import solve_discrete_are
 from lsu_mesh.experiments.comparison import VERDICTS
 from lsu_mesh.experiments.p2014 import experiment, figures, runs
 from lsu_mesh.experiments.p2014.runs import CORRELATED, KNOWN, UNCORRELATED, A, C, F, Job, estimator, result, simulate
-from lsu_mesh.experiments.p2014.tables import NINEFOLD, TABLE_I, TABLE_II, TABLE_III, THRICE, WELL
+from lsu_mesh.experiments.p2014.tables import (
+    FITTED_WELL,
+    FITTED_WRONG,
+    KALMAN,
+    TABLE_I,
+    TABLE_II,
+    TABLE_III,
+    THRICE,
+    WELL,
+)
 from lsu_mesh.filters.truncated_kalman import TruncatedKalman
 from lsu_mesh.filters.window.window_map import WindowMAP
 
@@ -22,7 +31,7 @@ def test_the_truncated_kalman_filter_has_the_papers_errors() -> None:
 
 
 def test_three_times_the_variances_cost_little() -> None:
-    """Why the paper's row of the wrong filter is not reproducible."""
+    """Read literally, the paper's row of the incorrect filter is not reproduced."""
     well, wrong = (result(Job(name, KNOWN, 0, "", factor, 1, 1000)) for name, factor in ((WELL, 1.0), (THRICE, 3.0)))
     assert (wrong.states > well.states).any()
     assert (wrong.states < 1.25 * well.states).all()
@@ -69,22 +78,39 @@ def test_v_kf_is_the_determinant_of_the_riccati_equation_where_nothing_is_trunca
     assert found.ellipsoid == pytest.approx(4 / 3 * np.pi * np.sqrt(np.linalg.det(P)), rel=1e-6)
 
 
+@pytest.mark.parametrize("name", [FITTED_WELL, FITTED_WRONG])
+def test_the_fitted_variances_have_the_determinants_of_the_paper(name: str) -> None:
+    found = 1e7 * runs.untruncated_determinant(KALMAN[name])
+    assert found == pytest.approx(1e7 * TABLE_III[name][0], rel=2e-4)
+    assert runs.untruncated_determinant(8.0) == pytest.approx(8.0**3 * runs.untruncated_determinant(1.0), rel=1e-9)
+
+
+def test_the_fitted_incorrect_filter_has_the_papers_errors_of_states_and_not_of_outputs() -> None:
+    well, wrong = (result(Job(name, KNOWN, 0, "", KALMAN[name], 1, 2500)) for name in (FITTED_WELL, FITTED_WRONG))
+    np.testing.assert_allclose(wrong.states, [0.106, 0.106, 0.086], atol=0.004)
+    assert wrong.untruncated == pytest.approx([12.0, 0.0, 0.0], abs=1.5)
+    assert well.outside == pytest.approx([68.0, 10.0, 0.1], abs=2.0)
+    assert (wrong.fits < 0.5 * np.array(TABLE_II[FITTED_WRONG][3:])).all()
+
+
 def test_n_kf_counts_what_is_farther_than_kappa() -> None:
     X, Y, U = simulate(False, 3, 120)
     job = Job("", KNOWN, 0, "", 1.0, 3, 120)
     filter = estimator(job)
     assert isinstance(filter, TruncatedKalman)
-    far = []
+    far, wider = [], []
     for t in range(121):
         filter.update(Y[t])
         if t > 25:
             error = X[t] - filter.point
             far.append(float(error @ np.linalg.inv(filter.covariance) @ error))
+            wider.append(float(error @ np.linalg.inv(filter.untruncated.covariance) @ error))
         if t < 120:
             filter.predict(U[t])
     found = result(job)
     for i, kappa in enumerate((1.0, 1.5, 2.0)):
         assert found.outside[i] == pytest.approx(100 * np.mean([d > kappa**3 for d in far]))
+        assert found.untruncated[i] == pytest.approx(100 * np.mean([d > kappa**3 for d in wider]))
         assert found.other[i] == pytest.approx(100 * np.mean([d > kappa**2 for d in far]))
 
 
@@ -135,15 +161,13 @@ def test_every_number_of_the_papers_tables_has_a_verdict(monkeypatch: pytest.Mon
     monkeypatch.setattr(figures, "DIMENSIONS", (2, 4))
     outcome = experiment.run(quick=True)
     tables = {table.name: table for table in outcome.tables}
-    given = {name: [float(row[-3]) for row in tables[f"p2014-table-{name}"].rows if row[-1] != "–"] for name in "12"}
+    given = {name: [float(row[-4]) for row in tables[f"p2014-table-{name}"].rows if row[-1] != "–"] for name in "12"}
     for _, *numbers in TABLE_I.values():
         assert all(given["1"].count(number) >= 1 for number in numbers)
     assert len(given["1"]) == 4 * len(TABLE_I) + 2
-    assert given["2"] == [
-        number for name, row in TABLE_II.items() for number in row * (1 if name in (WELL, THRICE, NINEFOLD) else 2)
-    ]
+    assert given["2"] == [number for name, row in TABLE_II.items() for number in row * (1 if name in KALMAN else 2)]
     third = tables["p2014-table-3"].rows
-    papers = [row[-3] for row in third if row[-1] != "–"]
+    papers = [row[-4] for row in third if row[-1] != "–"]
     for size, *outside in TABLE_III.values():
         assert any(size * scale == pytest.approx(paper) for paper in papers for scale in (1e3, 1e7) if paper != "1000")
         assert set(outside) <= set(papers)

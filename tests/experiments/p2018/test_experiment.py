@@ -19,8 +19,19 @@ from lsu_mesh.experiments.p2018.figures import (
     states_table,
     timings,
 )
-from lsu_mesh.experiments.p2018.runs import ESTIMATORS, STATISTICS, Job, data_of, prior, result
+from lsu_mesh.experiments.p2018.runs import (
+    ESTIMATORS,
+    NEW_STRIP,
+    OLD_EDGE,
+    STATISTICS,
+    Job,
+    Result,
+    data_of,
+    prior,
+    result,
+)
 from lsu_mesh.experiments.p2018.runs import statistics as rows_of
+from lsu_mesh.experiments.p2018.table_1 import comparison, spread_of, ties
 from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.simulation import Simulation
 
@@ -63,6 +74,50 @@ def test_an_effect_is_the_factor_between_the_ends() -> None:
     grid = np.outer([1.0, 5.0, 3.0], [1.0, 2.0])
     assert Effect.of(grid) == pytest.approx((3.0, 2.0))
     assert str(Effect(3.0, 2.0)) == "× 3 by ρ, × 2 by r"
+    assert Effect.difference(grid) == pytest.approx((3.0, 3.0))
+
+
+def test_which_noise_matters_more_depends_on_the_rule_for_ties() -> None:
+    grids = {(ties, noise.LEVELS): noise.errors(1, 3, noise.LEVELS, ties) for ties in ("old", "new")}
+    first, *readings = noise.what_matters(grids)
+    assert first.verdict.startswith("undecided: ")
+    assert first.here == "in 0 of 2 readings with the old edge, in 2 of 2 readings with the new strip"
+    assert [row.labels[0] for row in readings] == [
+        "Figure 2, 0.05 to 0.5, old edge",
+        "Figure 2, 0.05 to 0.5, new strip",
+    ]
+
+
+@pytest.fixture(scope="module")
+def few() -> dict[str, list[Result]]:
+    """Six runs with each rule for ties."""
+    return {name: [result(Job(name, seed)) for seed in range(1, 7)] for name in (OLD_EDGE, NEW_STRIP)}
+
+
+def test_keeping_the_old_edge_cuts_the_error_by_a_third(few: dict[str, list[Result]]) -> None:
+    rows = {row[0]: row for row in ties(few).rows}
+    assert rows["RMSE of x₂"][-1].mean == pytest.approx(0.71, abs=0.05)
+    assert rows["RMSE of all states"][-1].mean < 0.95
+    assert rows["Σ (x̂₂ − x₂)²"][1:4] == (
+        1.77,
+        spread_of(few[OLD_EDGE], STATISTICS[0]),
+        spread_of(few[NEW_STRIP], STATISTICS[0]),
+    )
+    assert rows["residual of y₁ is 0, % of steps"][3].mean > 95.0
+
+
+def test_a_deviation_names_the_other_rule_where_that_is_nearer(few: dict[str, list[Result]]) -> None:
+    rows = {row.labels: row for row in comparison(few)}
+    assert "; with the new strip 2." in rows[OLD_EDGE, "Σ (x̂₂ − x₂)²"].verdict
+    assert rows[NEW_STRIP, "std (ŷ₂ − y₂)"].verdict == "reproduced"
+    assert float(rows[OLD_EDGE, "std (ŷ₂ − y₂)"].z) > 3.0
+    assert " % of the steps here" in rows[OLD_EDGE, "median (ŷ₂ − y₂)"].verdict
+
+
+def test_what_is_on_the_data_is_counted() -> None:
+    found = result(Job(NEW_STRIP, 1, 60))
+    assert found.on_the_data[0] > found.on_the_data[1] > 20.0
+    assert found.rmse > 0.0
 
 
 def test_errors_grow_with_both_noises() -> None:

@@ -22,7 +22,7 @@ def made(limit: float) -> Outcome:
 
         return draw_transfer(
             [
-                transfer.Result("S2", "LSUPB", "predictor", r, 0.5, 0.6, 0.7, 3.0, 0.8, 0.9, 1.0, 0.0, 0.0)
+                transfer.Result("S2", "LSUPB", "predictor", r, 0.5, 0.6, 0.7, 3.0, 0.8, 0.9, 1.1, 1.0, 0.0, 0.0)
                 for r in (1, 2)
             ]
         )
@@ -72,9 +72,10 @@ SHORT = {
     "p2018.experiment": {"QUICK_RUNS": 1},
     "l2019.experiment": {"QUICK_STEPS": 60, "QUICK_RUNS": 1},
     "p2023.experiment": {"QUICK_STEPS": 30, "QUICK_RUNS": 1},
+    "fusion": {},
 }
 """What makes a part of ``reproduce all --quick`` as short as it can be."""
-LONG = ("p2014.experiment", "p2018.experiment", "l2019.experiment")
+LONG = ("p2014.experiment", "p2018.experiment", "l2019.experiment", "fusion")
 """Half a minute or more even so."""
 
 
