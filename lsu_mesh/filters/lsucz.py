@@ -257,7 +257,8 @@ class LSUCZ(Filter):
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Go on from the set and the box as they are, bit by bit."""
         body = checked_prior(self._model, support).to_constrained_zonotope().arrays
-        self._hold(Held(body, lower, upper, True, self._estimate.started(lower, upper)))
+        density = self._estimate.started(lower, upper)
+        self._hold(Held(body, lower, upper, is_hull=True, density=density))
 
     def take_density(self, density: Density) -> None:
         """Go on from this density, with the rule ``"mean"``."""
