@@ -310,19 +310,11 @@ class WindowMAP(Filter):
         lower[0], upper[0], Y[0] = low, high, np.nan
         return state._replace(
             data=data._replace(
-                Y=Y,
-                U=data.U[1:],
-                spread=data.spread[1:],
-                A=data.A[1:],
-                B=data.B[1:],
-                lower=lower,
-                upper=upper,
+                Y=Y, U=data.U[1:], spread=data.spread[1:], A=data.A[1:], B=data.B[1:], lower=lower, upper=upper,
                 X=data.X[1:],
             ),
-            smallest=state.smallest[1:],
-            largest=state.largest[1:],
-            counts=state.counts[1:],
-        )
+            smallest=state.smallest[1:], largest=state.largest[1:], counts=state.counts[1:],
+        )  # fmt: skip
 
     def condition(self, support: Support, gain: GainOf | None = "support") -> float:
         """Bayesian transfer: keep ``self ∩ support``, or a set of this class that holds it; see :class:`Filter`."""
