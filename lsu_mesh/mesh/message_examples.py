@@ -45,6 +45,16 @@ def example(topic: str) -> Message:
             "algorithm": 1,
         },
         "posterior": estimate,
+        "smoothed": bounds
+        | {
+            "support": box,
+            "lag": 5,
+            "base": ("posterior", "filter/box", "0123456789abcdef", 46),
+            "revision": 0,
+            "epoch": 0,
+            "guarantee": "declared",
+            "algorithm": 1,
+        },
         "fused": estimate
         | {
             "policy": "relaxed",

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from lsu_mesh.filters.grid import OffGrid
+from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config.digest import digest
 from lsu_mesh.mesh.config.problem import Problem
 from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
@@ -129,6 +130,11 @@ class FilterSettings:
     options: Mapping[str, Any]
     adopt: str = ""
     """The identifier whose bounds are adopted."""
+
+    @property
+    def lag(self) -> int:
+        """L of fixed-lag smoothing, the option of a class that smooths; 0: it publishes no smoothed sets."""
+        return int(self.options.get("lag", 0)) if filter_class(self.kind).smooths else 0
 
 
 @dataclass(frozen=True)

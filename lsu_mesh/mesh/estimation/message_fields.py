@@ -7,6 +7,7 @@ from typing import Any
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.mesh.sets import to_message
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 
@@ -41,6 +42,20 @@ def foretold(engine: Filter, input_box: Orthotope | None) -> dict[str, Any]:
         "y_lower": band.lower.tolist(),
         "y_upper": band.upper.tolist(),
         "y_point": band.point.tolist(),
+    }
+
+
+def smoothed(engine: Filter) -> dict[str, Any]:
+    """The fields of a smoothed set that the engine gives; none where it holds no state of ``lag`` steps back."""
+    lag = engine.lag
+    if not lag or engine.held_steps < lag:
+        return {}
+    lower, upper = engine.smoothed_bounds(lag)
+    return {
+        "lag": lag,
+        "support": to_message(engine.smoothed(lag)),
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
     }
 
 

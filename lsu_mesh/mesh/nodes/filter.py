@@ -6,17 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lsu_mesh.errors import InconsistentData
-from lsu_mesh.mesh.access import PUBLISHES, subscriptions
+from lsu_mesh.mesh.access import published_topics, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
 from lsu_mesh.mesh.estimation.filter_step import (
     FilterOutcome,
-    RejectedTransfer,
     contradiction_rule,
     filter_step,
 )
 from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
-from lsu_mesh.mesh.estimation.message_fields import can_foretell, described, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.message_fields import can_foretell, described, finite_or_none, foretold, smoothed
 from lsu_mesh.mesh.estimation.received_data import ReceivedData
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
 from lsu_mesh.mesh.estimation.step_data import BEFORE_PRIOR, StepData, Unused
@@ -30,11 +29,12 @@ from lsu_mesh.mesh.messages import (
     Message,
     Posterior,
     Prediction,
+    Smoothed,
     Suggestion,
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.estimator import Estimator
-from lsu_mesh.mesh.nodes.filter_events import dropped_event
+from lsu_mesh.mesh.nodes.filter_events import dropped_event, transfer_event, widened_event
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.source_timeout import input_key
 from lsu_mesh.mesh.nodes.starting import About
@@ -45,12 +45,12 @@ class FilterNode(Estimator):
     """Runs one filter of the library on the measurements of its sensors."""
 
     role = "filter"
-    publishes = PUBLISHES["filter"]
     answers = ("posterior",)
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         settings = configuration.filters[name]
         self.settings = settings
+        self.publishes = published_topics(configuration, self.role, name)
         model = configuration.model(settings.sensors)
         super().__init__(
             configuration,
@@ -178,7 +178,7 @@ class FilterNode(Estimator):
             used=used,
             missing=missing,
             origin=origin,
-            cause=self._cause(outcome),
+            cause=outcome.cause,
             gain=outcome.gain,
         ), messages
 
@@ -211,7 +211,8 @@ class FilterNode(Estimator):
         )
         # a transfer that misses the set was told of when the step was first done
         rejected = [one for one in outcome.rejected if one.by_data or not is_replay]
-        messages = [self._transfer_event(k, one, now) for one in rejected]
+        self._counts["transfers rejected"] += len(rejected)
+        messages = [transfer_event(self, k, one, now) for one in rejected]
         if outcome.error is None:
             if outcome.status == "ok":
                 self._agree(k)
@@ -224,7 +225,7 @@ class FilterNode(Estimator):
         if outcome.status == "ok":
             self._factor = outcome.factor
             self.held.downgrade_guarantee("learned")
-            return outcome, [*messages, self._widened_event(k, outcome.error, now)]
+            return outcome, [*messages, widened_event(self, k, outcome.error, factor=self._factor, now=now)]
         epoch = self.held.epochs.number
         messages += self._drop(data, outcome, now)
         if epoch != self.held.epochs.number:
@@ -241,28 +242,11 @@ class FilterNode(Estimator):
             self._transfer.forget_before(k - MAX_BOX_AGE)
         return [message for message in step.transfers if not self.held.epochs.is_abandoned(message)]
 
-    def _transfer_event(self, k: int, rejected: RejectedTransfer, now: int) -> Message:
-        self._counts["transfers rejected"] += 1
-        source = rejected.message.src
-        text = f"step {k}: the transfer from {source} was left out: {rejected.reason}"
-        return self.event("WARN", "transfer-rejected", text, now=now, step=k, about={"source": source, "step": k})
-
-    @staticmethod
-    def _cause(outcome: FilterOutcome) -> str | None:
-        if outcome.error is None:
-            return None
-        is_widened = outcome.status == "ok"
-        return f"{outcome.error}; r widened by {outcome.factor:.6g}" if is_widened else str(outcome.error)
-
     def _agree(self, k: int) -> None:
         self._inconsistent.clear()
         self._is_tested = self._is_tested or k > self._started_at
 
     # -- contradictions
-
-    def _widened_event(self, k: int, error: InconsistentData, now: int) -> Message:
-        text = f"step {k}: {error}; r was widened by {self._factor:.4g} in this step, the set is no longer guaranteed"
-        return self.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": self._factor})
 
     def _drop(self, data: StepData, outcome: FilterOutcome, now: int) -> list[Message]:
         """Tell what was left out because it contradicts the prediction; reset when it goes on."""
@@ -287,9 +271,8 @@ class FilterNode(Estimator):
             self._hold(start)
             data.update(self.engine)
             text = f"step {k}: {count} steps in a row contradicted the set; started again from {start.words}"
-            return self.event(
-                "ERROR", "reset", text, now=now, step=k, about={"step": k, "epoch": self.held.epochs.number}
-            )
+            about: About = {"step": k, "epoch": self.held.epochs.number}
+            return self.event("ERROR", "reset", text, now=now, step=k, about=about)
         text = (
             f"step {k}: {count} steps in a row contradicted the set and there is nothing sound to "
             "start again from; give the model a domain, or check the declared bounds"
@@ -315,11 +298,8 @@ class FilterNode(Estimator):
             return []
         self._hold(start)
         text = f"step {k}: started again from {start.words}"
-        return [
-            self.event(
-                "INFO", "found-start", text, now=now, step=k, about={"step": k, "epoch": self.held.epochs.number}
-            )
-        ]
+        about: About = {"step": k, "epoch": self.held.epochs.number}
+        return [self.event("INFO", "found-start", text, now=now, step=k, about=about)]
 
     def _abandon(self, data: StepData, why: str, about: About, now: int) -> Message:
         """A new epoch at once, so that others learn of it; held is something sound, or nothing that may be believed."""
@@ -372,6 +352,30 @@ class FilterNode(Estimator):
             gain=None if combined.gain is None else finite_or_none(combined.gain),
             algorithm=self.engine.algorithm,
         )
+
+    def is_told(self, step: Step) -> bool:
+        """The smoothed set too is what it was: a step that is done again may change it alone."""
+        if step.published is None or step.published.status == "inconsistent":
+            return True
+        found, old = smoothed(self.engine), step.smoothed
+        return all(getattr(old, name, None) == value for name, value in found.items())
+
+    def beside(self, posterior: Posterior, step: Step, now: int) -> list[Message]:
+        """The smoothed set of the same data; nothing where these were not believed."""
+        fields = smoothed(self.engine)
+        if posterior.status == "inconsistent" or not fields:
+            step.smoothed = None
+            return []
+        step.smoothed = Smoothed(
+            **self.stamp("smoothed", posterior.step - self.engine.lag, now, posterior.origin_ns),
+            **fields,
+            base=posterior.reference,
+            revision=posterior.revision,
+            epoch=posterior.epoch,
+            guarantee=posterior.guarantee,
+            algorithm=self.engine.algorithm,
+        )
+        return [step.smoothed]
 
     def prediction(self, k: int, now: int) -> list[Message]:
         if not can_foretell(self.engine, self.configuration.input_box):
