@@ -23,7 +23,7 @@ from lsu_mesh_services.monitoring.run_report import Row, RunReport
 from lsu_mesh_services.monitoring.table import share
 from lsu_mesh_services.recording.read import Received, Recording
 from lsu_mesh_services.replay.compare import CannotReplay, beside
-from lsu_mesh_services.replay.smoothing import SmoothedRow, json_lines, print_rows, smoothed_rows, with_lag
+from lsu_mesh_services.replay.smooth import SmoothedRow, json_lines, print_rows, smoothed_rows, with_lag
 
 
 def replay_again(recording: Recording, options: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ from lsu_mesh_services.cli import main
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.recording.read import read_recording
 from lsu_mesh_services.replay.compare import CannotReplay
-from lsu_mesh_services.replay.smoothing import smoothed_rows, with_lag
+from lsu_mesh_services.replay.smooth import smoothed_rows, with_lag
 
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.messages import Posterior, Smoothed
