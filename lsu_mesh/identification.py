@@ -118,8 +118,8 @@ def explain(
     InconsistentData
         No factor explains the data: what is kept contradicts them.
     """
-    _check(learn, margin, share)
-    plain, data = _plain(model, Y, U)
+    check_choices(learn, margin, share)
+    plain, data = plain_record(model, Y, U)
     structure = Structure(plain, unknown=unknown)
     data = record(structure, data.Y, data.U)
     box = Orthotope(*prior) if isinstance(prior, tuple) else prior
@@ -149,13 +149,14 @@ def explain(
     )
 
 
-def _plain(model: LSUModel, Y: ArrayLike, U: ArrayLike | None) -> tuple[LSUModel, Record]:
+def plain_record(model: LSUModel, Y: ArrayLike, U: ArrayLike | None) -> tuple[LSUModel, Record]:
     """The model without D, a and d, and its data: ``y − D u − d``, and for the offset an input that is 1."""
     if not isinstance(model, LSUModel):
-        raise ModelError("identification takes a discrete model: give A, B and rho of one step")
-    if model.period is not None or model.radii is not None:
-        part = "period" if model.radii is None else "continuous model"
-        raise ModelError(f"identification knows no {part}: unwrap the outputs, or discretise and drop the radii, first")
+        raise ModelError("explain takes a discrete model; rate_identification.explain_rates takes a continuous one")
+    if model.radii is not None:
+        raise ModelError("explain takes no step of a continuous model; rate_identification.explain_rates does")
+    if model.period is not None:
+        raise ModelError("identification knows no period: unwrap the outputs first")
     checked = record(Structure(model.replace(D=None, a=None, d=None)), Y, U)
     if model.D is None and model.a is None and model.d is None:
         return model, checked
@@ -195,7 +196,7 @@ def smallest(structure: Structure, data: Record, learn: Learn, first: Orthotope 
     return batch_map(structure, data, HalfWidths.common_factor(shape, learns), first)
 
 
-def _check(learn: str, margin: float, share: float) -> None:
+def check_choices(learn: str, margin: float, share: float) -> None:
     if learn not in LEARN:
         raise ModelError(f"learn must be one of {', '.join(LEARN)}, it is {learn!r}")
     if not (np.isfinite(margin) and margin >= 1.0):
@@ -268,5 +269,5 @@ def report(found: Explanation) -> str:
 
 def learn_choice(text: str) -> Learn:
     """The choice of this name."""
-    _check(text, 1.0, 1.0)
+    check_choices(text, 1.0, 1.0)
     return cast("Learn", text)

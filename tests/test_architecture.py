@@ -21,6 +21,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("systems", "simulation", "metrics"),
         ("filters", "fusion"),
         ("identification", "testing"),
+        ("rate_identification",),
         ("experiments", "mesh"),
     ],
     "lsu_mesh.kernels": [
@@ -72,7 +73,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
         ("message_examples", "sets", "data_files"),
         ("config",),
-        ("access", "measurement_time", "model_answer", "time_requirements"),
+        ("access", "input_time", "measurement_time", "model_answer", "time_requirements"),
         ("admission",),
         ("flows",),
         ("estimation",),

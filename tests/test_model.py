@@ -92,7 +92,7 @@ def test_a_stretch_too_long_and_a_continuous_model_in_the_wrong_place_are_named(
         LSUO(unstable, Orthotope([0.0], [1.0]))  # type: ignore[arg-type]
     with pytest.raises(ModelError, match="window estimators know no continuous model"):
         WindowMAP(unstable, Orthotope([0.0], [1.0]))  # type: ignore[arg-type]
-    with pytest.raises(ModelError, match="identification takes a discrete model"):
+    with pytest.raises(ModelError, match="explain takes a discrete model"):
         explain(unstable, [[0.0], [1.0]])  # type: ignore[arg-type]
 
 

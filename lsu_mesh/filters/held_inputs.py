@@ -29,19 +29,28 @@ class HeldInputs:
     """``values[i]`` acts from ``times_ns[i]`` on, up to the next switch; times increase.
 
     ``before``: what acts before the first switch; without it nothing is known there, and to ask is a ``ModelError``.
-    ``delay_ns``: every switch takes place up to so much after its time, nobody knows when; until then the input varies
-    between the two. A switch must not come sooner than this after the one before.
+    ``delay_ns``, one or one for each switch: a switch takes place up to so much after its time, nobody knows when;
+    until then the input varies between the two. The next switch must not come sooner than that.
     """
 
     def __init__(
-        self, times_ns: Sequence[int], values: Sequence[Input], before: Input = None, *, delay_ns: int = 0
+        self,
+        times_ns: Sequence[int],
+        values: Sequence[Input],
+        before: Input = None,
+        *,
+        delay_ns: int | Sequence[int] = 0,
     ) -> None:
         if len(times_ns) != len(values) or any(a >= b for a, b in itertools.pairwise(times_ns)):
             raise ModelError("inputs need one time each, and the times must increase")
-        if delay_ns < 0 or any(b - a < delay_ns for a, b in itertools.pairwise(times_ns)):
-            raise ModelError(f"a delay of {delay_ns} ns must not be negative, nor longer than an input is held")
+        delays = (delay_ns,) * len(times_ns) if isinstance(delay_ns, int) else tuple(delay_ns)
+        lengths = [b - a for a, b in itertools.pairwise(times_ns)]
+        if min(delays, default=0) < 0 or any(h < e for h, e in zip(lengths, delays, strict=False)):
+            raise ModelError(f"a delay of {max(delays)} ns must not be negative, nor longer than an input is held")
+        if len(delays) != len(times_ns):
+            raise ModelError(f"{len(times_ns)} switches need one delay, or one each, not {len(delays)}")
         self._times, self._values, self._before = tuple(times_ns), tuple(values), before
-        self._delay = delay_ns
+        self._settled = tuple(time + delay for time, delay in zip(times_ns, delays, strict=True))
 
     @classmethod
     def constant(cls, u: Input = None) -> HeldInputs:
@@ -57,7 +66,7 @@ class HeldInputs:
         index = bisect_right(self._times, start_ns) - 1
         while start_ns < end_ns:
             following = self._times[index + 1] if index + 1 < len(self._times) else end_ns
-            settled = self._times[index] + self._delay if index >= 0 else start_ns
+            settled = self._settled[index] if index >= 0 else start_ns
             if start_ns < settled:
                 until = min(settled, following, end_ns)
                 yield Piece(until - start_ns, self._between(index - 1, index), varies=True)
@@ -68,7 +77,7 @@ class HeldInputs:
 
     def hull(self, start_ns: int, end_ns: int) -> Input:
         """One input, or a box, that holds every input that acts in [start, end]."""
-        first = bisect_right(self._times, start_ns - self._delay) - 1
+        first = bisect_right(self._settled, start_ns) - 1
         return self._between(first, bisect_right(self._times, end_ns) - 1)
 
     def _between(self, first: int, last: int) -> Input:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.array_types import Flags, Matrix, Vector
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
@@ -44,7 +44,7 @@ def plain_strips(
     widths = half_width_vector("r", r, arrays.r)
     if model.has_plain_outputs:
         return values, widths
-    shift, spread = _shift(model, u)
+    shift, spread = _shift(model, u, is_asked=~np.isnan(values))
     period = np.zeros(values.size) if model.period is None else np.array(model.period)
     low, high = image(arrays.C) if period.any() else (np.zeros(values.size), np.zeros(values.size))
     plain_y, plain_r = np.empty_like(values), np.empty_like(values)
@@ -59,16 +59,16 @@ def shifted(prediction: OutputPrediction, model: LSUModel, u: ArrayLike | Orthot
     """An interval of ``C x + v`` as one of ``y = C x + D u + d + v``."""
     if model.D is None and model.d is None:
         return prediction
-    kernels.shifted_interval(*prediction, *_shift(model, u))
+    kernels.shifted_interval(*prediction, *_shift(model, u, is_asked=np.ones(model.output_count, dtype=bool)))
     return prediction
 
 
-def _shift(model: LSUModel, u: ArrayLike | Orthotope | None) -> tuple[Vector, Vector]:
-    """``D u + d`` (m,) and what is not known of it."""
+def _shift(model: LSUModel, u: ArrayLike | Orthotope | None, is_asked: Flags) -> tuple[Vector, Vector]:
+    """``D u + d`` (m,) and what is not known of it; u may be left out where no output that is asked for sees it."""
     m = model.output_count
     d = np.zeros(m) if model.d is None else np.array(model.d)
     shift, spread = np.empty(m), np.empty(m)
-    if model.D is None:
+    if model.D is None or (u is None and not model.D[is_asked].any()):
         D, center, half_widths = np.zeros((m, 0)), np.zeros(0), np.zeros(0)
     elif u is None:
         raise ModelError("D ≠ 0: an output depends on the input; give u, or an Orthotope that holds it")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection
 
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.input_time import check_beginning
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.measurement_time import is_timed, placed
 from lsu_mesh.mesh.messages import (
@@ -179,6 +180,8 @@ class Admission:
         self._check_shape(address.name, message)
         if isinstance(message, Measurement):
             message = placed(self._configuration, message)
+        elif isinstance(message, Input):
+            check_beginning(self._configuration, message)
         return message, unknown
 
     def _check_shape(self, name: str, message: Message) -> None:

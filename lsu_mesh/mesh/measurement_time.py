@@ -47,13 +47,17 @@ def placed(configuration: Configuration, message: Measurement) -> Measurement:
     return message if message.step == k else structs.replace(message, step=max(0, k))
 
 
+def goes_to_nearest(configuration: Configuration, sensor: SensorSettings) -> bool:
+    """Whether data of the sensor are of the step that is nearest, whatever their time: no set is guaranteed then."""
+    return configuration.continuous is None and sensor.off_grid == "nearest" and not sensor.rate
+
+
 def step_of(configuration: Configuration, sensor: SensorSettings, time_ns: int) -> int:
     """The step of a moment, below 1 where it is of t_0 or before."""
     grid = configuration.grid
     if configuration.continuous is None:
         nearest = grid.nearest_step(time_ns)
-        goes_nearest = sensor.off_grid == "nearest" and not sensor.rate
-        if goes_nearest or abs(grid.time_of(nearest) - time_ns) <= tolerance_ns(sensor):
+        if goes_to_nearest(configuration, sensor) or abs(grid.time_of(nearest) - time_ns) <= tolerance_ns(sensor):
             return nearest
     return grid.step_of(time_ns)
 

@@ -183,7 +183,7 @@ class Input(Message, frozen=True, kw_only=True):
     topic = "input"
     u: Numbers
     time_ns: Count | None = None
-    """When it began to act, nanoseconds since 1970; nil: at the moment of its step."""
+    """When it began to act, nanoseconds since 1970, up to ``input_delay`` after its step; nil: it does not say."""
 
     def __post_init__(self) -> None:
         Message.__post_init__(self)

@@ -92,6 +92,19 @@ def test_zero_parts_are_no_parts(made: type[Filter]) -> None:
     assert full.has_plain_outputs
 
 
+@pytest.mark.parametrize("made", MADE)
+def test_the_input_is_asked_for_only_where_a_value_sees_it(made: type[Filter]) -> None:
+    prior = Orthotope([-10.0], [10.0])
+    both = LSUModel([[1.0]], [[1.0]], [[1.0], [1.0]], 0.0, [0.1, 0.1], D=[[2.0], [0.0]], d=[1.0, 0.5])
+    alone = both.replace(C=[[1.0]], D=None, d=[0.5], r=[0.1], outputs=["y"])
+    one, other = made(both, prior), made(alone, prior)  # type: ignore[call-arg]
+    one.update([np.nan, 7.0])
+    other.update([7.0])
+    np.testing.assert_array_equal(one.bounds(), other.bounds())
+    with pytest.raises(ModelError, match="D ≠ 0"):
+        one.update([7.0, 7.0])
+
+
 @pytest.mark.parametrize("made", MADE[:4])
 def test_an_input_known_as_a_box_widens_the_strip(made: type[Filter]) -> None:
     model = LSUModel([[1.0]], [[1.0]], [[1.0]], 0.0, 0.1, D=[[2.0]], d=[1.0])

@@ -1,4 +1,4 @@
-"""Recorded measurements and inputs by step, from files of data."""
+"""Files of data that a mesh plays: their columns, and what becomes of every row."""
 
 from __future__ import annotations
 
@@ -6,15 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from lsu_mesh.mesh.config.problem import DataProblem, data_problem
 from lsu_mesh.mesh.data_files import DataFileError, look, read
-from lsu_mesh.mesh.data_files.account import Account, account, place
-from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
+from lsu_mesh.mesh.data_files.account import Account, account
 from lsu_mesh.mesh.data_files.unplayable import nearest_doubt, off_grid_error
-from lsu_mesh.mesh.grid import Grid
 
 if TYPE_CHECKING:
     from lsu_mesh.mesh.config.settings import Configuration, MeasurementFileSettings, SensorSettings
@@ -38,19 +33,6 @@ class Columns:
     columns: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Playback:
-    """Values by step: ``values[k]`` belongs to ``steps[k]``, ascending.
-
-    ``collisions`` rows shared a step with an earlier row and were left out.
-    """
-
-    steps: NDArray[np.int64]
-    time_ns: NDArray[np.int64]
-    values: NDArray[np.float64]
-    collisions: int
-
-
 def read_columns(settings: MeasurementFileSettings, default_count: int) -> Columns:
     """The columns of a file, from its header alone; the rows are not read.
 
@@ -58,25 +40,6 @@ def read_columns(settings: MeasurementFileSettings, default_count: int) -> Colum
     Raises :class:`FileProblems`.
     """
     return Columns(look(settings, default_count))
-
-
-def read_playback(settings: MeasurementFileSettings, dt: object, start_time: object) -> Playback:
-    """The file's values by step; a row with a time is put on the step whose t_k is nearest.
-
-    The first row of a step counts.
-    Rows before step 1 are left out. Raises :class:`FileProblems`.
-    """
-    data = read(settings)
-    placed = place(data, grid_of(dt, start_time))
-    order = np.flatnonzero(placed.is_delivered)
-    order = order[np.argsort(placed.steps[order], kind="stable")]
-    times = np.zeros(len(placed.steps), dtype=np.int64) if data.time_ns is None else np.maximum(data.time_ns, 0)
-    return Playback(placed.steps[order], times[order], data.values[order], int(placed.is_sharing.sum()))
-
-
-def grid_of(dt: object, start_time: object) -> Grid:
-    """The grid of a mesh; without a start it begins at 0."""
-    return Grid(0 if start_time is None else start_time_ns(start_time)[0], exact_dt(dt))
 
 
 def accounts(configuration: Configuration) -> dict[str, Account]:

@@ -146,7 +146,8 @@ class HeldSet:
         """Carry the prior on through the input of step k, and note the input's message where it is known."""
         if message is not None:
             self.record_used([message.reference])
-        self.reach.predict(u, k, earlier, reference=None if message is None else message.reference)
+        reference, since = (None, None) if message is None else (message.reference, message.time_ns)
+        self.reach.predict(u, k, earlier, reference=reference, since=since)
 
     # -- going back
 

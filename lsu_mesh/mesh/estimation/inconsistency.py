@@ -66,7 +66,9 @@ def update_without_contradicting_strips(engine: Filter, y: Vector, r: Vector | N
 
     If none does alone, or the rest is contradictory too, all of the step is dropped. r (m,) and u as of the update.
     """
-    band = engine.predict_output() if u is None else engine.predict_output(u)
+    # without u no value sees an input, and the band of an output that would is not asked for
+    seen = np.zeros(engine.model.input_count) if u is None and engine.model.D is not None else u
+    band = engine.predict_output() if seen is None else engine.predict_output(seen)
     band = widened(band, r, engine.model.r)
     outside = (y < band.lower) | (y > band.upper)
     alone = tuple(np.flatnonzero(outside).tolist())

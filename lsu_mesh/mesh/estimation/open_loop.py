@@ -62,10 +62,12 @@ class OpenLoop:
         self._engine = None
         self._inputs.clear()
 
-    def predict(self, u: Drive, k: int, earlier: Drive = None, *, reference: Reference | None = None) -> None:
+    def predict(
+        self, u: Drive, k: int, earlier: Drive = None, *, reference: Reference | None = None, since: int | None = None
+    ) -> None:
         """Time update of step k with its input, called ``reference``, or with the box of all inputs.
 
-        ``earlier`` is that of the step before, see :func:`predict_step`.
+        ``earlier`` is that of the step before, and u acts from ``since`` on, see :func:`predict_step`.
         """
         if self._engine is None:
             return
@@ -73,7 +75,7 @@ class OpenLoop:
         if self._lists_inputs and reference is not None and k <= MAX_LISTED:
             self._inputs[k] = reference
         try:
-            predict_step(self._engine, self._configuration, k, u=u, earlier=earlier)
+            predict_step(self._engine, self._configuration, k, u=u, earlier=earlier, since=since)
         except (UnboundedSupport, InconsistentData):
             self.lose()
 

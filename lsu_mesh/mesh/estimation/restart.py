@@ -104,7 +104,9 @@ class RestartSearch:
                 return None
             u = None if message is None else np.array(message.u)
             try:
-                predict_step(engine, self._configuration, j, u=u, earlier=earlier)
+                predict_step(
+                    engine, self._configuration, j, u=u, earlier=earlier, since=message.time_ns if message else None
+                )
             except (InconsistentData, UnboundedSupport):
                 return None
             used += [] if message is None else [message.reference]

@@ -20,7 +20,7 @@ from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.filters.timed_data import TimedDatum, cut
 from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
 from lsu_mesh.mesh.estimation.time_update import Origin
-from lsu_mesh.mesh.measurement_time import tolerance_ns
+from lsu_mesh.mesh.measurement_time import goes_to_nearest, tolerance_ns
 from lsu_mesh.mesh.messages import Input, Measurement, Reference
 from lsu_mesh.mesh.time_requirements import ONE_UPDATE
 from lsu_mesh.model import ContinuousModel
@@ -35,6 +35,8 @@ ONE_PER_STEP = "more than one of a step"
 
 Values = Callable[[int], Drive]
 """The input of a step, or the box that holds it; ``None`` where neither is known."""
+Beginnings = Callable[[int], tuple[int, int]]
+"""When the input of a step begins to act, in ns, and how much later at most."""
 
 
 class Datum(NamedTuple):
@@ -167,7 +169,7 @@ class DataOfSteps:
         grid, has_flow = self._configuration.grid, self._configuration.continuous is not None
         listed = list(messages)
         told = [message for message in listed if any(value is not None for value in message.y)]
-        value = self._values(k, origin, known)
+        value, begins = self._values(k, origin, known), self._beginnings(k, origin, known)
         found: list[Datum] = []
         unused: list[Unused] = []
         for message in told:
@@ -179,13 +181,14 @@ class DataOfSteps:
         found.sort(key=lambda one: one.timed.order)
         found, spare = self._first_of_each(found)
         needed = sorted({j for one in found for j in self.inputs_of(k, one.message)})
-        inputs = self._held({*needed, k - 1} if has_flow else set(), value)
+        before = [] if origin is None or origin.earlier is None else [k - 2]
+        inputs = self._held({*needed, *before, k - 1} if has_flow else set(), value, begins)
         at_end = inputs.hull(grid.time_of(k), grid.time_of(k)) if has_flow else value(k)
         data = StepData(
             k=k, start_ns=grid.time_of(k - 1), end_ns=grid.time_of(k), data=tuple(found), y=None, r=None,
             u=at_end if k in needed else None, inputs=inputs,
             origin=origin, flow=self._configuration.flow(k - 1),
-            seen=tuple(known[j].reference for j in needed if j in known and not (origin is not None and j == k - 1)),
+            seen=tuple(known[j].reference for j in needed if j in known and not self._is_of_origin(j, k, origin)),
             unused=(*unused, *spare),
             silent=frozenset(one.name for one in listed if one not in told) - {one.message.name for one in found},
         )  # fmt: skip
@@ -207,7 +210,7 @@ class DataOfSteps:
         first, end = configuration.grid.time_of(1), configuration.grid.time_of(k)
         is_on_grid = error == 0 and time == end
         sensor = configuration.sensors[message.name]
-        is_nearest = configuration.continuous is None and sensor.off_grid == "nearest" and not sensor.rate
+        is_nearest = goes_to_nearest(configuration, sensor)
         if message.step < 1 or (not is_on_grid and not is_nearest and time - error < first):
             return BEFORE_PRIOR
         if configuration.continuous is not None and not is_on_grid:
@@ -266,22 +269,36 @@ class DataOfSteps:
         box = self._configuration.input_box
 
         def value(j: int) -> Drive:
-            if j == k - 1 and origin is not None:
-                return origin.u
+            if origin is not None and self._is_of_origin(j, k, origin):
+                return origin.u if j == k - 1 else box if origin.earlier is None else origin.earlier
             return np.array(known[j].u) if j in known else box
 
         return value
 
-    def _held(self, steps: set[int], value: Values) -> HeldInputs:
+    def _is_of_origin(self, j: int, k: int, origin: Origin | None) -> bool:
+        """Whether the set was carried from step k − 1 with the input of step j, or with the box in its place."""
+        return origin is not None and (j == k - 1 or (j == k - 2 and self._configuration.input_delay_ns > 0))
+
+    def _beginnings(self, k: int, origin: Origin | None, known: Mapping[int, Input]) -> Beginnings:
+        grid, delay = self._configuration.grid, self._configuration.input_delay_ns
+
+        def begins(j: int) -> tuple[int, int]:
+            is_told = j in known and not (j == k - 2 and origin is not None and origin.earlier is None)
+            since = known[j].time_ns if is_told else None
+            if origin is not None and j == k - 1:
+                since = origin.since
+            return (grid.time_of(j), delay) if since is None else (since, 0)
+
+        return begins
+
+    def _held(self, steps: set[int], value: Values, begins: Beginnings) -> HeldInputs:
         """The inputs of these steps, and of those between them, at their times."""
         if not self._sees_inputs or not steps:
             return HeldInputs.constant()
-        grid, box = self._configuration.grid, self._configuration.input_box
         listed = range(min(steps), max(steps) + 1)
-        return HeldInputs(
-            [grid.time_of(j) for j in listed], [value(j) for j in listed], before=box,
-            delay_ns=self._configuration.input_delay_ns,
-        )  # fmt: skip
+        times, delays = zip(*map(begins, listed), strict=True)
+        values = [value(j) for j in listed]
+        return HeldInputs(times, values, before=self._configuration.input_box, delay_ns=delays)
 
     # -- all of a step in one update
 

@@ -19,10 +19,18 @@ class Origin:
     """Snapshot of the engine that holds it."""
     u: Drive
     """What drove the step before: the input, or the box of all inputs."""
+    earlier: Drive = None
+    """The input before that, where inputs may act late and it was known."""
+    since: int | None = None
+    """When ``u`` began to act, where its message says so."""
 
 
-def predict_step(engine: Filter, configuration: Configuration, k: int, u: Drive, earlier: Drive = None) -> None:
+def predict_step(
+    engine: Filter, configuration: Configuration, k: int, u: Drive, earlier: Drive = None, since: int | None = None
+) -> None:
     """Time update of the set of x(t_k) with u, and with ``earlier``, the input before it, where u may act late.
+
+    ``since``: the moment in ns at which u begins to act, if it is known; ``earlier`` acts till then.
 
     Raises what :meth:`Filter.predict` does.
     """
@@ -35,5 +43,6 @@ def predict_step(engine: Filter, configuration: Configuration, k: int, u: Drive,
         return
     start, end = configuration.grid.time_of(k), configuration.grid.time_of(k + 1)
     before = configuration.input_box if earlier is None else earlier
-    held = HeldInputs([start], [u], before=before, delay_ns=configuration.input_delay_ns)
+    begins, delay = (start, configuration.input_delay_ns) if since is None else (since, 0)
+    held = HeldInputs([begins], [u], before=before, delay_ns=delay)
     carry(engine, flow, start, end_ns=end, inputs=held)

@@ -45,6 +45,7 @@ class Timeline:
         self._input_lost = max(INPUT_LOST, configuration.cached)
         self._max_steps = max(MAX_STEPS, 2 * configuration.cached)
         self._newest_input = 0
+        self._acts_late = configuration.input_delay_ns > 0
         self._dirty: int | None = None
         self._saw_box: dict[int, set[int]] = {}
 
@@ -71,6 +72,8 @@ class Timeline:
         self._newest_input = max(self._newest_input, message.step)
         if self.current is not None and message.step < self.current:
             self.do_again(message.step, step)
+            if self._acts_late and message.step + 1 < self.current:  # the input before may still act in a step
+                self.do_again(message.step + 1, self.step(message.step + 1))
         for k in self._saw_box.pop(message.step, ()):
             if self.current is not None and self.is_over(k):
                 self.do_again(k, self.step(k))

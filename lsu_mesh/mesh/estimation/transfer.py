@@ -119,7 +119,7 @@ def carried(
     """The fused box of a step, carried to step k by the model; ``InconsistentData`` where it leaves the domain."""
     box, earlier = LSUO(model, Orthotope(message.lower, message.upper)), None
     for j in range(message.step, k):
-        u = np.array(inputs[j].u) if model.input_count else None
-        predict_step(box, configuration, j, u=u, earlier=earlier)
+        u, since = (np.array(inputs[j].u), inputs[j].time_ns) if model.input_count else (None, None)
+        predict_step(box, configuration, j, u=u, earlier=earlier, since=since)
         earlier = u
     return Orthotope(*box.bounds())

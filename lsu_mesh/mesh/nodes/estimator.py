@@ -114,7 +114,7 @@ class Estimator(StartingNode):
             return []
         if step.input is None:
             self.timeline.record_input(step, message)
-        elif step.input.u != message.u:
+        elif (step.input.u, step.input.time_ns) != (message.u, message.time_ns):
             about: About = {"source": message.src, "step": message.step}
             text = f"input of step {message.step} came again from {message.src} with another value; the first counts"
             return [self.event("WARN", "input-changed", text, now=now, step=message.step, about=about)]
@@ -237,11 +237,12 @@ class Estimator(StartingNode):
                 self._waiting = f"input of step {k} ({input_key(self.configuration)})" if is_late else ""
                 return False
         self._waiting = ""
-        earlier = self._earlier_input(k)
+        earlier, since = self._earlier_input(k), None if step.input is None else step.input.time_ns
         self.held.predict_reach(k, u, earlier, message=step.input)
         if self.configuration.continuous is not None:
-            self.timeline.step(k + 1).origin = None if self.held.unsound else Origin(self.engine.snapshot(), u)
-        if not self._predict_set(k, u, earlier, now=now):
+            known = Origin(self.engine.snapshot(), u, earlier, since)
+            self.timeline.step(k + 1).origin = None if self.held.unsound else known
+        if not self._predict_set(k, u, earlier, since=since, now=now):
             return False
         self.timeline.advance()
         return True
@@ -254,10 +255,10 @@ class Estimator(StartingNode):
         self.held.record_used([message.reference])
         return np.array(message.u)
 
-    def _predict_set(self, k: int, u: Drive, earlier: Drive, *, now: int) -> bool:
+    def _predict_set(self, k: int, u: Drive, earlier: Drive, *, since: int | None, now: int) -> bool:
         """Time update of the set; one that leaves the domain was wrong, one that outgrows all numbers says nothing."""
         try:
-            predict_step(self.engine, self.configuration, k, u=u, earlier=earlier)
+            predict_step(self.engine, self.configuration, k, u=u, earlier=earlier, since=since)
         except (InconsistentData, UnboundedSupport) as error:
             words = f"the prediction from step {k} failed: {error}"
             if not self.start_without_data(k + 1, abandons=True):

@@ -10,7 +10,7 @@ from lsu_mesh.array_types import Integers, Vector
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.data_files import DataFile, read
 from lsu_mesh.mesh.data_files.account import Placement, place
-from lsu_mesh.mesh.nodes.time_fields import goes_to_nearest
+from lsu_mesh.mesh.measurement_time import goes_to_nearest
 
 
 class PlayedRow(NamedTuple):

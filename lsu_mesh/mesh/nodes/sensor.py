@@ -11,11 +11,12 @@ import numpy as np
 from lsu_mesh.array_types import Vector
 from lsu_mesh.mesh.access import PUBLISHES, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration, SensorFault
+from lsu_mesh.mesh.measurement_time import step_of
 from lsu_mesh.mesh.messages import Measurement, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.plant_course import PlantCourse
 from lsu_mesh.mesh.nodes.sensor_clock import Moment, SensorClock
-from lsu_mesh.mesh.nodes.time_fields import step_of, time_fields
+from lsu_mesh.mesh.nodes.time_fields import time_fields
 from lsu_mesh.simulation import measured, random_uniform
 
 REMEMBERED = 4096

@@ -1,11 +1,10 @@
-"""How a source writes down when it measured, and the step that this is of."""
+"""How a source writes down when it measured."""
 
 from __future__ import annotations
 
 from typing import TypedDict
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
 from lsu_mesh.mesh.data_files.spans import seconds_text
 from lsu_mesh.mesh.grid import Grid
 
@@ -15,22 +14,6 @@ class TimeFields(TypedDict):
 
     time_ns: int
     time_error_ns: int | None
-
-
-def goes_to_nearest(configuration: Configuration, sensor: SensorSettings) -> bool:
-    """Whether data of the sensor are of the step that is nearest, whatever their time: no set is guaranteed then."""
-    return configuration.continuous is None and sensor.off_grid == "nearest" and not sensor.rate
-
-
-def step_of(configuration: Configuration, sensor: SensorSettings, time_ns: int) -> int:
-    """The step of a moment, as receivers place it."""
-    grid = configuration.grid
-    if configuration.continuous is None:
-        nearest = grid.nearest_step(time_ns)
-        tolerance = 1 if sensor.tolerance_ns is None else sensor.tolerance_ns
-        if goes_to_nearest(configuration, sensor) or abs(grid.time_of(nearest) - time_ns) <= tolerance:
-            return nearest
-    return grid.step_of(time_ns)
 
 
 def time_fields(grid: Grid, time_ns: int, error_ns: int) -> TimeFields:

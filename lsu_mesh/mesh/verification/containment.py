@@ -16,7 +16,17 @@ from typing import NamedTuple
 
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
-from lsu_mesh.mesh.messages import Fused, Guarantee, Measurement, Message, Posterior, Prediction, Reference, Smoothed
+from lsu_mesh.mesh.messages import (
+    Fused,
+    Guarantee,
+    Input,
+    Measurement,
+    Message,
+    Posterior,
+    Prediction,
+    Reference,
+    Smoothed,
+)
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.mesh.verification.archive import Archive, Unverifiable
 
@@ -153,13 +163,23 @@ class Containment:
         on_grid = message.time_ns == self.configuration.grid.time_of(message.step)
         return message.time_error_ns is None or (message.time_error_ns == 0 and on_grid)
 
+    def _acting(self, k: int) -> Input | None:
+        """The input that acts at t_k; ``None`` where it is not known."""
+        assert self.configuration is not None
+        message = self.archive.inputs.get(k)
+        if message is None or not self.configuration.input_delay_ns:
+            return message
+        if message.time_ns is None:
+            return None
+        return message if message.time_ns <= self.configuration.grid.time_of(k) else self.archive.inputs.get(k - 1)
+
     def _noise(self, sensor: SensorSettings, row: int, y: Fraction, *, x: list[float], k: int) -> Fraction | None:
         """``|y − C x − D u − d|``, of the nearest period; ``None`` where the input that it sees is not known."""
         assert self.configuration is not None
         expected = _product(sensor.C[row], x) + (Fraction(sensor.offset[row]) if sensor.offset else 0)
         if sensor.D and any(sensor.D[row]):
-            message = self.archive.inputs.get(k)
-            if message is None or self.configuration.input_delay_ns:
+            message = self._acting(k)
+            if message is None:
                 return None
             expected += _product(sensor.D[row], message.u)
         noise = y - expected

@@ -20,11 +20,13 @@ class Brought:
     known: dict[int, Input] = field(default_factory=dict)
     """By step, the inputs that data of this step may have seen."""
     earlier: Input | None = None
-    """The input before the one that drives it on."""
+    """The input of the step before, as far as it is known."""
 
 
-def provenance_steps(posterior: Posterior, first: int, archive: Archive) -> dict[int, Brought]:
+def provenance_steps(posterior: Posterior, first: int, archive: Archive, *, acts_late: bool) -> dict[int, Brought]:
     """The steps ``first`` … ``posterior.step`` with what each was given.
+
+    ``acts_late``: whether an input may still act in the step after its own.
 
     Raises :class:`Unverifiable` where a message is not in the archive, :class:`DoesNotFit` where one cannot have been
     used at these steps.
@@ -46,7 +48,7 @@ def provenance_steps(posterior: Posterior, first: int, archive: Archive) -> dict
         k = message.step
         if isinstance(message, Input):
             known[k] = message
-            if _is_only_seen(messages, i, at):
+            if (acts_late and k == at - 1) or _is_only_seen(messages, i, at):
                 continue
             at = k + 1
         elif isinstance(message, Fused) and not isinstance(posterior, Fused):  # carried forward to a later step
@@ -58,21 +60,17 @@ def provenance_steps(posterior: Posterior, first: int, archive: Archive) -> dict
         _add(steps[k], message, posterior)
         if isinstance(message, Measurement) and len(known) > len(steps[k].known):
             steps[k].known = dict(known)
-        if isinstance(message, Input):
-            steps[k].earlier = known.get(k - 1)
+    for k, brought in steps.items():
+        brought.earlier = known.get(k - 1)
     return steps
 
 
 def _is_only_seen(messages: Sequence[Message], i: int, at: int) -> bool:
     """Whether an input does not drive the set on from step ``at`` or a later one.
 
-    It is listed before data that see it, by their feedthrough or by the error of their time, or before the input of the
-    next step, which may act late.
+    It is listed before data that see it, by their feedthrough or by the error of their time.
     """
     k = messages[i].step
-    following = messages[i + 1] if i + 1 < len(messages) else None
-    if isinstance(following, Input) and k < at and following.step == k + 1:
-        return True
     upcoming = next((other.step for other in messages[i + 1 :] if isinstance(other, Measurement | Prediction)), None)
     return upcoming is not None and (k < at or k >= upcoming)
 

@@ -77,7 +77,8 @@ class Recomputation(ABC):
         contradicts itself.
         """
         first = self._hold_base(recorded, recorded.base)
-        steps = provenance_steps(recorded, first, self._archive)
+        acts_late = self._configuration.input_delay_ns > 0
+        steps = provenance_steps(recorded, first, self._archive, acts_late=acts_late)
         found, is_widened = Recomputed({}), False
         try:
             for k, brought in steps.items():
@@ -130,15 +131,15 @@ class Recomputation(ABC):
         found = recorded.algorithm if recorded.algorithm is not None else 1
         return None if found == number else f"{what} algorithm {found}, this is {number}"
 
-    def _own_inputs(self, recorded: Prediction) -> tuple[Drive, Drive]:
-        """What drove a prediction on, the input that it used or the input box; and the input before, if it was used."""
+    def _own_inputs(self, recorded: Prediction) -> tuple[Drive, Drive, int | None]:
+        """The input, or the input box, that drove a prediction on; the input before, if it was used; since when."""
         if not self._engine.model.input_count:
-            return None, None
+            return None, None, None
         used = [self._archive.find(reference, Input) for reference in recorded.used]
         inputs = [message for message in used if message.step != recorded.step - 2]
         earlier = next((np.array(message.u) for message in used if message not in inputs), None)
         if [message.step for message in inputs] == [recorded.step - 1] and not recorded.missing:
-            return np.array(inputs[0].u), earlier
+            return np.array(inputs[0].u), earlier, inputs[0].time_ns
         box = self._configuration.input_box
         if inputs or recorded.missing != ["input"]:
             words = f"the input of step {recorded.step - 1}"
@@ -147,7 +148,7 @@ class Recomputation(ABC):
             )
         if box is None:
             raise DoesNotFit("missing", recorded.missing, "nothing, because the configuration has no input_box")
-        return box, earlier
+        return box, earlier, None
 
     @abstractmethod
     def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Recomputed:
@@ -190,7 +191,8 @@ class Recomputation(ABC):
         reach = OpenLoop(self._configuration, self._engine.model)
         reach.begin(self._configuration.prior)
         for j in range(1, k):
-            reach.predict(self._driven(j, known.get(j)), j, self._earlier(known.get(j - 1)))
+            u = self._driven(j, known.get(j))
+            reach.predict(u, j, self._earlier(known.get(j - 1)), since=_since(known.get(j)))
         if reach.box is None:
             raise DoesNotFit("base", "the prior carried forward", "something that is bounded")
         return reach.box
@@ -215,10 +217,10 @@ class Recomputation(ABC):
     def _advance(self, k: int, brought: Brought) -> None:
         if self._engine.model.input_count and brought.input is None and self._configuration.input_box is None:
             raise DoesNotFit("used", f"no input of step {k}", "one, because the model has inputs and no input_box")
-        u = self._driven(k, brought.input)
+        u, earlier, since = self._driven(k, brought.input), self._earlier(brought.earlier), _since(brought.input)
         if self._configuration.continuous is not None:
-            self._origin = Origin(self._engine.snapshot(), u)
-        predict_step(self._engine, self._configuration, k, u=u, earlier=self._earlier(brought.earlier))
+            self._origin = Origin(self._engine.snapshot(), u, earlier, since)
+        predict_step(self._engine, self._configuration, k, u=u, earlier=earlier, since=since)
 
     def _earlier(self, message: Input | None) -> Drive:
         """The input before, where inputs may act late."""
@@ -240,6 +242,11 @@ class Recomputation(ABC):
     def _noise_bounds(self, factor: float = 1.0) -> Bounds:
         rho, r = self._engine.half_widths
         return Bounds(rho=rho.tolist(), r=(r * factor).tolist())
+
+
+def _since(message: Input | None) -> int | None:
+    """When an input began to act, where its message says so."""
+    return None if message is None else message.time_ns
 
 
 class FilterRecomputation(Recomputation):

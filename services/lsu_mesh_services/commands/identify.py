@@ -19,10 +19,11 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.data_files.spans import duration_text
 from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.measurement_time import goes_to_nearest
 from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
 from lsu_mesh.mesh.nodes.played_rows import PlayedRows
 from lsu_mesh.mesh.nodes.recorded_inputs import recorded_inputs
-from lsu_mesh.mesh.nodes.time_fields import goes_to_nearest
+from lsu_mesh.rate_identification import explain_rates
 from lsu_mesh_services.configuration import load_or_explain, print_warnings
 from lsu_mesh_services.exit_codes import FAILURE, NOT_MET, OK, USAGE
 from lsu_mesh_services.played_files import accounts_or_explain
@@ -48,23 +49,45 @@ def main(options: argparse.Namespace) -> int:
         return USAGE
     try:
         names, Y, U, first = _data(configuration, options)
-        found = explain(
-            configuration.model(names), Y, U, learn=options.learn, margin=options.margin, share=options.share,
-            unknown=[text.split(",") for text in options.unknown],
-        )  # fmt: skip
+        found = _explained(configuration, names, Y, U=U, options=options)
     except (LsuMeshError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return FAILURE if not isinstance(error, NoData) else USAGE
-    print(json.dumps(_record(found, first)) if options.json else _words(found, names, first))
+    is_rate = configuration.continuous is not None
+    print(json.dumps(_record(found, first)) if options.json else _words(found, names, first, is_rate=is_rate))
     return OK if found.held_out is None or found.held_out.is_explained else NOT_MET
+
+
+def _explained(
+    configuration: Configuration, names: list[str], Y: Matrix, *, U: Matrix | None, options: argparse.Namespace
+) -> Explanation:
+    """The bounds of a step, or of a continuous model the rates."""
+    model = configuration.model(names)
+    if configuration.continuous is None:
+        return explain(
+            model, Y, U, learn=options.learn, margin=options.margin, share=options.share,
+            unknown=[text.split(",") for text in options.unknown],
+        )  # fmt: skip
+    if options.unknown:
+        raise NoData(f"{options.file}: --unknown needs a discrete model: entries of a step are no rates; leave it out")
+    grid = configuration.grid
+    if (grid.dt * 10**9).denominator != 1:
+        raise NoData(f"{options.file}: rates are looked for in equal steps: choose a dt of whole nanoseconds")
+    assert model.flow is not None
+    return explain_rates(
+        model.flow, Y, U, dt_ns=grid.time_of(2) - grid.time_of(1), learn=options.learn, margin=options.margin,
+        share=options.share,
+    )  # fmt: skip
 
 
 def _data(
     configuration: Configuration, options: argparse.Namespace
 ) -> tuple[list[str], Matrix, Matrix | None, int]:  # fmt: skip
     """Names of the sensors, outputs (T, m), inputs (T − 1, p), and the step of the first row."""
-    if not configuration.has_one_model:
-        raise NoData(f"{options.file}: the bounds of equal steps are looked for, which needs one discrete model")
+    if configuration.schedule:
+        raise NoData(f"{options.file}: one model is looked for, and [[model.schedule]] names several: remove it")
+    if configuration.input_delay_ns:
+        raise NoData(f"{options.file}: inputs have to act for whole steps: remove input_delay")
     if options.recording:
         measured, inputs = _recorded(configuration, options.recording)
     else:
@@ -156,9 +179,10 @@ def _decoded(key: str, payload: bytes) -> Message | None:
         return None
 
 
-def _words(found: Explanation, names: list[str], first: int) -> str:
-    note = f"rows are steps from {first}" if first != 1 else ""
-    head = f"sensors {', '.join(names)}{'; ' + note if note else ''}"
+def _words(found: Explanation, names: list[str], first: int, *, is_rate: bool) -> str:
+    notes = [f"rows are steps from {first}"] if first != 1 else []
+    notes += ["rho is a rate: a bound of the noise at every moment"] if is_rate else []
+    head = "; ".join([f"sensors {', '.join(names)}", *notes])
     return f"{head}\n{report(found)}"
 
 

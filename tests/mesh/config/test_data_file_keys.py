@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load, load_values
-from lsu_mesh.mesh.config.measurement_files import accounts, read_playback
+from lsu_mesh.mesh.config.measurement_files import accounts
 from lsu_mesh.mesh.config.write import to_toml
+from lsu_mesh.mesh.nodes.played_rows import PlayedRows
 
 
 def playing(tmp_path: Path, root: Path, csv: str, keys: str) -> Configuration:
@@ -26,11 +27,9 @@ def test_a_file_is_read_as_its_keys_say(tmp_path: Path, root: Path) -> None:
     )
     csv = "t|y\n% a pause\n1600120070020,0|2,5\n1600120070040|?\n"
     configuration = playing(tmp_path, root, csv, keys)
-    file, mesh = configuration.sensors["s1"].file, configuration.mesh
-    assert file is not None
-    played = read_playback(file, mesh.dt, mesh.start_time)
-    assert played.steps.tolist() == [1, 2]
-    assert played.values[0].tolist() == [2.5]
+    played = PlayedRows(configuration, "s1")
+    assert (played.first, played.last) == (1, 2)
+    assert [row.y.tolist() for row in played.of(1)] == [[2.5]]
     assert accounts(configuration)["sensors.s1"].missing_values == 1
 
 

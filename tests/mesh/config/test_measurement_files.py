@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from lsu_mesh.mesh.config import Configuration, load
-from lsu_mesh.mesh.config.measurement_files import FileProblems, accounts, read_columns, read_playback
-from lsu_mesh.mesh.config.settings import MeasurementFileSettings
+from lsu_mesh.mesh.config.measurement_files import FileProblems, accounts
+from lsu_mesh.mesh.nodes.played_rows import PlayedRows
 
 
 @pytest.fixture
@@ -55,28 +54,10 @@ def test_what_is_played_is_what_is_counted(tmp_path: Path, demo: str) -> None:
     text = demo.replace("dt = 0.02", "dt = 0.02\nstart_time = 0.0")
     keys = 'time = "t"\ngrid_tolerance = "1ms"'
     configuration = playing(tmp_path, text, "t,y\n0.02,1\n0.041,2\n0.039,3\n-1,4\n0.1,\n", keys)
-    found, file = accounts(configuration)["sensors.s1"], configuration.sensors["s1"].file
-    assert file is not None
-    played = read_playback(file, 0.02, 0.0)
+    found, played = accounts(configuration)["sensors.s1"], PlayedRows(configuration, "s1")
+    by_step = {k: [float(row.y[0]) for row in played.of(k)] for k in range(played.first, played.last + 1)}
     assert (found.rows, found.delivered, found.before, found.sharing) == (5, 4, 1, 1)
     assert (found.off_grid, found.by_tolerance) == (0, 2)
-    assert played.steps.tolist() == [1, 2, 5]
-    assert (played.collisions, found.steps_used) == (1, 3)
-
-
-def test_rows_are_put_on_the_nearest_step_and_the_first_one_counts(tmp_path: Path) -> None:
-    (tmp_path / "data.csv").write_text("t,y\n100.5,1.0\n101.02,\n102.5,1.5\n102.6,7\n99,3\n")
-    settings = MeasurementFileSettings(tmp_path / "data.csv", ("y",), "t", "time")
-    played = read_playback(settings, 0.5, 100.0)
-    assert played.steps.tolist() == [1, 2, 5]
-    assert played.time_ns.tolist() == [100_500_000_000, 101_020_000_000, 102_500_000_000]
-    assert played.values[:, 0].tolist()[::2] == [1.0, 1.5]
-    assert played.collisions == 1
-    assert read_columns(settings, 1).columns == ("y",)
-
-
-def test_a_step_of_a_third_of_a_second_does_not_drift(tmp_path: Path) -> None:
-    rows = "".join(f"{float(Fraction(k, 3))!r},{k}\n" for k in range(1, 2000))
-    (tmp_path / "data.csv").write_text(f"t,y\n{rows}")
-    played = read_playback(MeasurementFileSettings(tmp_path / "data.csv", (), "t", "time"), "1/3", None)
-    assert played.steps.tolist() == played.values[:, 0].tolist()
+    assert {k: len(values) for k, values in by_step.items() if values} == {1: 1, 2: 2, 5: 1}
+    assert by_step[2] == [3.0, 2.0]
+    assert (played.before, played.after, found.steps_used) == (1, 0, 3)

@@ -290,7 +290,13 @@ def test_a_set_that_is_empty_kills_nobody(role: str) -> None:
     }
     fields = fields_of("posterior") | {"model": configuration.digest(), "lower": [-1.0] * 3, "upper": [1.0] * 3}
     fields |= {"point": [0.0] * 3, "support": nothing, "step": 9, "src": "filter/cz", "status": "ok"}
-    drive = fields_of("input") | {"model": configuration.digest(), "u": [0.0], "step": 9, "src": "plant/plant"}
+    drive = fields_of("input") | {
+        "model": configuration.digest(),
+        "u": [0.0],
+        "step": 9,
+        "src": "plant/plant",
+        "time_ns": None,
+    }
     node = (
         FusionNode(configuration, "main", "f" * 16) if role == "fusion" else FilterNode(configuration, "cz", "f" * 16)
     )

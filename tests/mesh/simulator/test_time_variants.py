@@ -13,6 +13,7 @@ from msgspec import structs
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Measurement
 from lsu_mesh.mesh.nodes import sensor
+from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.simulator import run, variants
 from lsu_mesh.mesh.simulator.faults import FAULTS
 from lsu_mesh.mesh.simulator.run import Outcome, run_seed
@@ -144,6 +145,12 @@ def test_reports_that_are_put_on_the_nearest_step_are_found(demo: Path, monkeypa
     monkeypatch.setattr(sensor.SimulatedSensorNode, "_measurement", on_the_step)
     monkeypatch.setattr(variants, "timed", narrow)
     assert found_in(demo, "own moments", monkeypatch).startswith(("containment", "false alarm", "restart"))
+
+
+@pytest.mark.parametrize("way", ["own moments", "erring clocks", "rates", "schedule"])
+def test_late_data_that_are_not_brought_in_are_found(demo: Path, monkeypatch: pytest.MonkeyPatch, way: str) -> None:
+    monkeypatch.setattr(Estimator, "_rewind", lambda self, k: None)
+    assert found_in(demo, way, monkeypatch).startswith("late data")
 
 
 def test_about_half_of_the_seeds_go_by_time_and_every_way_is_drawn(demo: Path) -> None:

@@ -82,3 +82,62 @@ def test_data_between_the_steps_are_refused_by_name(mesh: Path, capsys: pytest.C
     (mesh.parent / "s.csv").write_text("t,y\n1.0,0.5\n2.0,0.5\n2.0,0.75\n")
     assert main(["identify", str(mesh)]) == USAGE
     assert "a measurement of s is not the only one of step 2" in capsys.readouterr().err
+
+
+CONTINUOUS = """
+[mesh]
+name = "files"
+dt = {dt}
+start_time = 0.0
+[model]
+continuous = true
+A = [[0.0]]
+rho = [0.5]
+{model}
+[model.prior]
+lower = [-50.0]
+upper = [50.0]
+[model.domain]
+lower = [-50.0]
+upper = [50.0]
+[sensors.s]
+C = [[1.0]]
+r = [0.2]
+file = "s.csv"
+columns = ["y"]
+time = "t"
+"""
+
+
+def drift(tmp_path: Path, dt: str = "0.5", model: str = "") -> Path:
+    """``x' = w`` with reports at 0, 1 and 5 half seconds: 3 in half a second, and 4 in 2 s."""
+    (tmp_path / "s.csv").write_text("t,y\n0.5,0.0\n1.0,3.0\n3.0,7.0\n")
+    path = tmp_path / "mesh.toml"
+    path.write_text(CONTINUOUS.format(dt=dt, model=model))
+    return path
+
+
+def test_of_a_continuous_model_the_rate_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["identify", str(drift(tmp_path)), "--learn", "rho", "--margin", "1", "--share", "1"]
+    assert main([*arguments, "--json"]) == OK
+    found = json.loads(capsys.readouterr().out)
+    assert found["rho"] == [pytest.approx((3.0 - 0.4) / 0.5)]
+    assert found["factor"] == pytest.approx(found["rho"][0] / 0.5)
+    assert main(arguments) == OK
+    assert "rho is a rate: a bound of the noise at every moment" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("dt", "model", "options", "said"),
+    [
+        ("0.5", "", ["--unknown", "A,1,1,-1,1"], "--unknown needs a discrete model"),
+        ("0.5", "", ["--learn", "separate"], 'take "both", "r" or "rho"'),
+        ('"1/6"', "", [], "choose a dt of whole nanoseconds"),
+        ("0.5", "schedule = [{ from = 3, rho = [1.0] }]", [], "names several: remove it"),
+    ],
+)
+def test_what_a_continuous_model_cannot_have_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], dt: str, model: str, options: list[str], said: str
+) -> None:
+    assert main(["identify", str(drift(tmp_path, dt, model)), "--share", "1", *options]) != OK
+    assert said in capsys.readouterr().err
