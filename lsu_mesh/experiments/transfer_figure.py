@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-STYLES = {"LSUO lp": ("#d1495b", "^"), "LSUPB": ("#1a1a1a", "o"), "LSUCZ": ("#8fa3d8", "s")}
+STYLES = {"LSUO lp": ("#d1495b", "^"), "LSUP": ("#2f5d50", "v"), "LSUPB": ("#1a1a1a", "o"), "LSUCZ": ("#8fa3d8", "s")}
 """Colour, of another grey each, and mark by filter."""
 PANELS: Sequence[tuple[str, Callable[[Result], float]]] = (
     ("width ÷ isolated", lambda result: result.width),

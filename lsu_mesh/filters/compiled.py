@@ -114,6 +114,8 @@ class CompiledFilter(Filter):
     ) -> Support:
         used, arrays = (self._model, self._arrays) if model is None else self._of_step(model)
         strips = plain_strips(used, arrays, y, r=r, u=u, image=self._image)
+        if np.isnan(strips[0]).all():
+            return self.support
         state, status = self._cut(self._state, arrays.C, *strips)
         if status > 0:
             rounded = known_to_last_bits(arrays.C, *strips, self.bounds())
@@ -183,9 +185,12 @@ class CompiledFilter(Filter):
 
     @property
     def last_met(self) -> Support | None:
-        """The set that was met last, where the state is still what came of it, bit by bit."""
-        met = self._met
-        return met.met if met is not None and met.state.tobytes() == self._state.tobytes() else None
+        """The set that was met last, where the state in force is the one that came of it.
+
+        An equal state that came of something else, as of a time update of a state at rest, does not count: replay would
+        have to know of it.
+        """
+        return self._met.met if self._met is not None and self._met.state is self._state else None
 
     @last_met.setter
     def last_met(self, support: Support) -> None:

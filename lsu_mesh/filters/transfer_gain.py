@@ -41,12 +41,13 @@ class SizeBefore(NamedTuple):
     def of(cls, filter: Filter, gain: GainOf) -> SizeBefore:
         """The size now."""
         is_exact = gain == "support" and filter.model.state_count <= MAX_EXACT_VOLUME
-        return cls(filter.bounds(), _log_volume(filter) if is_exact else -math.inf)
+        hull = filter.bounds()
+        return cls(hull, log_volume(filter.support, hull) if is_exact else -math.inf)
 
     def gain(self, filter: Filter) -> Gain:
         """What has been gained since, never negative."""
         if self.log_volume > -math.inf:
-            after = _log_volume(filter)
+            after = log_volume(filter.support, filter.bounds())
             if after > -math.inf:
                 return Gain(max(0.0, self.log_volume - after), "support")
         return Gain(hull_gain(self.hull, filter.bounds()), "hull")
@@ -81,11 +82,11 @@ def hull_gain(before: tuple[Vector, Vector], after: tuple[Vector, Vector]) -> fl
     return max(0.0, float(np.sum(np.log(widths) - np.log(left))))
 
 
-def _log_volume(filter: Filter) -> float:
-    """Of the support; ``-inf`` where it is flat but for rounding."""
-    lower, upper = filter.bounds()
+def log_volume(support: Support, bounds: tuple[Vector, Vector]) -> float:
+    """``ln vol`` of a set with these bounds (n,), (n,); ``-inf`` where it is flat but for rounding."""
+    lower, upper = bounds
     widths = upper - lower
     if not (widths > FLAT * np.maximum(np.abs(lower), np.abs(upper))).all():
         return -math.inf
-    found = filter.support.log_volume()
+    found = support.log_volume()
     return found if found > float(np.log(widths).sum()) + math.log(FLAT) else -math.inf

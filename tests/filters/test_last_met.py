@@ -111,6 +111,20 @@ def test_what_changes_the_set_ends_the_memory(kind: str, action: str) -> None:
     assert filter.last_met is not other
 
 
+@pytest.mark.parametrize("kind", ["LSUO", "LSUP", "LSUPB", "LSUCZ", "ZonotopicKalman"])
+def test_a_time_update_of_a_state_at_rest_ends_the_memory_too(kind: str) -> None:
+    """Its set may be the same, bit by bit, and a replay that starts from there knows no set that was met."""
+    model = LSUModel(np.eye(2), None, [[1.0, 0.0]], 0.0, 0.1)
+    filter: Filter = filter_class(kind)(model, Orthotope([-1.0, -1.0], [1.0, 1.0]))  # type: ignore[call-arg]
+    other = Orthotope([-0.5, -0.5], [0.5, 0.5])
+    filter.condition(other)
+    filter.predict()
+    assert filter.last_met is None
+    filter.condition(other)
+    filter.resume(filter.support, *filter.bounds())
+    assert filter.last_met is None
+
+
 def test_an_update_without_data_leaves_the_memory() -> None:
     for kind in ("LSUO", "LSUP", "LSUPB", "LSUCZ", "ZonotopicKalman"):
         filter, x, rng = prepared(kind, 3)

@@ -26,6 +26,8 @@ _SPAN = re.compile(r"([0-9]{1,18}(?:\.[0-9]{1,18})?)\s*(ns|us|ms|s|min)")
 _UNIT_NS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9}
 MOST_NS = 2**62
 """146 years: longer spans are not counted in nanoseconds."""
+SMALLEST = 5e-324
+"""A number larger than minus this is not negative."""
 _TRUE, _FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
@@ -177,6 +179,11 @@ def number(above: float = -math.inf) -> Expected[float]:
     """A finite number, larger than ``above``; whole numbers are numbers too."""
     words = "a finite number" if above == -math.inf else f"a number > {above:g}"
     return Expected(words, lambda value: as_number(value, above))
+
+
+def nats() -> Expected[float]:
+    """A gain: a finite number, not negative."""
+    return Expected("a number of nats ≥ 0", lambda value: as_number(value, -SMALLEST))
 
 
 def duration(low: float = 0.0) -> Expected[float]:

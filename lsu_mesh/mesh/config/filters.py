@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple, get_args
 
 from lsu_mesh.errors import ModelError
-from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.filter import Filter, GainOf
 from lsu_mesh.filters.registry import filter_class, filter_kinds
-from lsu_mesh.mesh.config.expected import Expected, Unfit, choice, known_names
+from lsu_mesh.mesh.config.expected import Expected, Unfit, choice, known_names, nats
 from lsu_mesh.mesh.config.filter_options import FilterOptions, try_options
 from lsu_mesh.mesh.config.settings import FilterSettings, OnInconsistency, SensorSettings, TransferWay
 from lsu_mesh.mesh.config.system import System
@@ -16,6 +16,8 @@ from lsu_mesh.mesh.config.table import REQUIRED, Table
 
 TRANSFERS: tuple[TransferWay, ...] = get_args(TransferWay)
 INCONSISTENCIES: tuple[OnInconsistency, ...] = get_args(OnInconsistency)
+GAINS: tuple[GainOf, ...] = get_args(GainOf)
+TRANSFER = "transfer"
 ALIASES = {"on_contradiction": "on_inconsistency"}
 """Keys by the names that they had before, which recordings and older files hold."""
 
@@ -67,8 +69,8 @@ def read_filter(
     chosen = read_names(table, "sensors", sensors)
     deadline = table.duration("deadline", 0.05)
     history = table.whole("history", 32, low=1, high=4096)
-    transfer = table.choice("transfer", TRANSFERS, "off")
-    senders = _read_senders(table, name, transfer, peers)
+    transfer = _read_transfer(table)
+    senders = _read_senders(table, name, transfer.way, peers)
     on_inconsistency = _read_inconsistency(table)
     reset_after = table.whole("reset_after", 5, low=1)
     adopt = _read_adopt(table, peers["identifier"], system)
@@ -79,13 +81,41 @@ def read_filter(
         sensors=chosen,
         deadline=deadline,
         history=history,
-        transfer=transfer,
+        transfer=transfer.way,
         transfer_from=senders,
+        transfer_gain=transfer.gain,
+        publish_when=transfer.publish_when,
         on_inconsistency=on_inconsistency,
         reset_after=reset_after,
         options=options,
         adopt=adopt,
     )
+
+
+class TransferKeys(NamedTuple):
+    """``transfer``: what is taken, whose volumes its gain compares, and when the own prediction is published."""
+
+    way: TransferWay
+    gain: GainOf
+    publish_when: float
+
+
+def _read_transfer(table: Table) -> TransferKeys:
+    """``transfer``: a word, or a table with the word as ``way``."""
+    word: TransferWay = "off"
+    if isinstance(table.values.get(TRANSFER), dict):
+        inner = table.table(TRANSFER)
+        assert inner is not None
+    else:
+        word = table.choice(TRANSFER, TRANSFERS, word)
+        inner = Table({}, f"{table.path}.{TRANSFER}", table.problems)
+    way = inner.choice("way", TRANSFERS, word)
+    gain = inner.choice("gain", GAINS, "hull")
+    publish_when = inner.read("publish_when", 0.0, nats())
+    inner.finish()
+    if gain != "hull" and way == "off":
+        inner.without("gain", 'has no effect with way = "off"', "remove it or choose a way")
+    return TransferKeys(way, gain, publish_when)
 
 
 def _read_inconsistency(table: Table) -> OnInconsistency:

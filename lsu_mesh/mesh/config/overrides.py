@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from lsu_mesh.mesh.config.exact_times import is_moment, with_all_digits
 from lsu_mesh.mesh.config.expected import SHOWN_LENGTH
-from lsu_mesh.mesh.config.filters import ALIASES
+from lsu_mesh.mesh.config.filters import ALIASES, TRANSFER
 from lsu_mesh.mesh.config.network import SECRET
 from lsu_mesh.mesh.config.problem import Problems
 
@@ -59,7 +59,7 @@ def apply(values: dict[str, Any], overrides: Sequence[Override], problems: Probl
         *tables, last = override.key.split(".")
         table: Any = values if tables and all((*tables, last)) else None
         for name in tables:
-            table = table.setdefault(name, {}) if isinstance(table, dict) else None
+            table = _inner(table, name) if isinstance(table, dict) else None
         if not isinstance(table, dict):
             problems.add("", override.source, f"expected {FORM}", expected=FORM, found=_shortened(override.value))
             continue
@@ -67,6 +67,13 @@ def apply(values: dict[str, Any], overrides: Sequence[Override], problems: Probl
             table.pop(other, None)
         table[last] = _value(override.value, keeps_digits=is_moment(override.key))
         problems.sources[override.key] = override.source
+
+
+def _inner(table: dict[str, Any], name: str) -> Any:
+    """The table of a name, which may not be there yet; that of a transfer may be written as its word alone."""
+    if name == TRANSFER and isinstance(table.get(name), str):
+        table[name] = {"way": table[name]}
+    return table.setdefault(name, {})
 
 
 def _other_spellings(tables: Sequence[str], key: str) -> list[str]:

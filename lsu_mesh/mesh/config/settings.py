@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from lsu_mesh.filters.filter import GainOf
 from lsu_mesh.filters.grid import OffGrid
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config.digest import digest
@@ -130,6 +131,10 @@ class FilterSettings:
     options: Mapping[str, Any]
     adopt: str = ""
     """The identifier whose bounds are adopted."""
+    transfer_gain: GainOf = "hull"
+    """Whose volumes the published gain of transfers compares."""
+    publish_when: float = 0.0
+    """Nats that a prediction has to gain on what others hold of the one published last; 0: each is published."""
 
     @property
     def lag(self) -> int:

@@ -24,3 +24,8 @@ def adopted_model(configuration: Configuration, settings: FilterSettings, messag
     """The model of a filter with the suggested bounds; a sensor that the suggestion does not name keeps its r."""
     r = [width for sensor in settings.sensors for width in message.r.get(sensor, configuration.sensors[sensor].r)]
     return configuration.model(settings.sensors).replace(rho=message.rho, r=r)
+
+
+def filter_algorithm(settings: FilterSettings, engine: Filter | type[Filter]) -> int:
+    """Number of the arithmetic of a filter's sets; with that of conditioning, where it takes transfers."""
+    return engine.algorithm + (engine.conditioning - 1 if settings.transfer != "off" else 0)

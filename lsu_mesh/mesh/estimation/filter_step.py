@@ -13,7 +13,9 @@ from typing import Literal, NamedTuple, assert_never
 import numpy as np
 
 from lsu_mesh.errors import InconsistentData
-from lsu_mesh.filters.filter import Filter
+from lsu_mesh.filters.filter import Filter, GainOf
+from lsu_mesh.filters.last_met import is_same
+from lsu_mesh.filters.transfer_gain import SETTLED, SizeBefore
 from lsu_mesh.mesh.config.settings import OnInconsistency
 from lsu_mesh.mesh.estimation.inconsistency import (
     Dropped,
@@ -42,18 +44,32 @@ class RejectedTransfer(NamedTuple):
     """Whether the step's data, and not the set, contradict it."""
 
 
+class Transfers(NamedTuple):
+    """How a step takes transfers.
+
+    ``as_set`` makes sets of them; ``gain`` says whose volumes are compared before the first and after the last;
+    ``None`` adds up what the class measures of each, as older peers did.
+    """
+
+    messages: Sequence[Transferred]
+    as_set: AsSet
+    gain: GainOf | None = "hull"
+
+
 @dataclass(frozen=True)
 class FilterOutcome:
     """What came of a step's data.
 
-    ``transfers`` are those in the set, ``gain`` theirs in nats (``None``: none is); ``factor`` is that by which r was
-    widened; ``error`` says how the data contradict the set, and ``dropped`` which rows were left out for it, or
-    ``strips``, of data with moments of their own.
+    ``transfers`` are those in the set, ``gain`` theirs in nats by the volumes ``gain_of`` (``None``: none is, or the
+    hulls show nothing of what was cut); ``factor`` is that by which r was widened; ``error`` says how the data
+    contradict the set, and ``dropped`` which rows were left out for it, or ``strips``, of data with moments of their
+    own.
     """
 
     status: Literal["ok", "predicted", "inconsistent"]
     transfers: Sequence[Transferred] = ()
     gain: float | None = None
+    gain_of: GainOf | None = None
     rejected: Sequence[RejectedTransfer] = ()
     factor: float = 1.0
     error: InconsistentData | None = None
@@ -79,9 +95,7 @@ def contradiction_rule(choice: OnInconsistency) -> Rule:
             assert_never(choice)
 
 
-def filter_step(
-    engine: Filter, data: StepData, transfers: Sequence[Transferred], as_set: AsSet, rule: Rule
-) -> FilterOutcome:
+def filter_step(engine: Filter, data: StepData, transfers: Transfers, rule: Rule) -> FilterOutcome:
     """Bring one step's data into the engine's set of x(t_k), the prediction.
 
     Data before t_k go from the posterior of the step before, each at its own moment; then ``condition`` on each
@@ -89,38 +103,44 @@ def filter_step(
     contradict the set are treated by ``rule``; where no factor of r explains them, ``"widen"`` is ``"drop"``.
     """
     if data.y is None:
-        return _walked_step(engine, data, transfers, as_set=as_set, rule=rule)
+        return _walked_step(engine, data, transfers, rule)
     before = engine.snapshot()
-    used, gain, rejected = _bring(engine, transfers, as_set)
+    found = _bring(engine, transfers)
     if np.isnan(data.y).all():
-        return FilterOutcome("predicted", used, gain, rejected)
+        return replace(found, status="predicted")
     try:
         data.update(engine)
     except InconsistentData as error:
-        if used and _agrees_without_transfers(engine, data, before):
-            return FilterOutcome("ok", rejected=[*rejected, *_by_data(used)])
-        return _contradicted(engine, data, FilterOutcome("inconsistent", used, gain, rejected, error=error), rule)
-    return FilterOutcome("ok", used, gain, rejected)
+        if found.transfers and _agrees_without_transfers(engine, data, before):
+            return FilterOutcome("ok", rejected=[*found.rejected, *_by_data(found.transfers)])
+        return _contradicted(engine, data, replace(found, status="inconsistent", error=error), rule)
+    return found
 
 
 def _by_data(used: Sequence[Transferred]) -> list[RejectedTransfer]:
     return [RejectedTransfer(one, "it contradicts the data", True) for one in used]
 
 
-def _bring(
-    engine: Filter, transfers: Sequence[Transferred], as_set: AsSet
-) -> tuple[list[Transferred], float | None, list[RejectedTransfer]]:
+def _bring(engine: Filter, transfers: Transfers) -> FilterOutcome:
+    """Condition on each; what the data will make of it is not known yet."""
     used: list[Transferred] = []
     rejected: list[RejectedTransfer] = []
-    gain = 0.0
-    for message in transfers:
+    own, gain = engine.support, 0.0
+    before = SizeBefore.of(engine, transfers.gain) if transfers.gain is not None and transfers.messages else None
+    for message in transfers.messages:
         try:
-            gain += engine.condition(as_set(message))
+            gain += engine.condition(transfers.as_set(message), gain=None)
         except InconsistentData as error:
             rejected.append(RejectedTransfer(message, str(error), False))
             continue
         used.append(message)
-    return used, gain if used else None, rejected
+    if not used:
+        return FilterOutcome("ok", rejected=rejected)
+    if before is None:
+        return FilterOutcome("ok", used, gain, rejected=rejected)
+    nats, of = before.gain(engine)
+    is_hidden = of == "hull" and nats < SETTLED and not is_same(own, engine.support)
+    return FilterOutcome("ok", used, None if is_hidden else nats, of, rejected=rejected)
 
 
 def _agrees_without_transfers(engine: Filter, data: StepData, before: object) -> bool:
@@ -153,16 +173,14 @@ def _contradicted(engine: Filter, data: StepData, found: FilterOutcome, rule: Ru
     return replace(found, dropped=dropped)
 
 
-def _walked_step(
-    engine: Filter, data: StepData, transfers: Sequence[Transferred], as_set: AsSet, rule: Rule
-) -> FilterOutcome:
+def _walked_step(engine: Filter, data: StepData, transfers: Transfers, rule: Rule) -> FilterOutcome:
     """A step whose data have moments of their own."""
     walk = Walk(data, engine.snapshot())
     found = FilterOutcome("ok")
 
     def bring_transfers() -> None:
         nonlocal found
-        found = FilterOutcome("ok", *_bring(engine, transfers, as_set))
+        found = _bring(engine, transfers)
 
     try:
         walk.go(engine, bring_transfers)

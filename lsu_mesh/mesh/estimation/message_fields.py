@@ -7,6 +7,7 @@ from typing import Any
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.filters.filter import Filter
+from lsu_mesh.mesh.messages import Posterior
 from lsu_mesh.mesh.sets import to_message
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
@@ -45,10 +46,13 @@ def foretold(engine: Filter, input_box: Orthotope | None) -> dict[str, Any]:
     }
 
 
-def smoothed(engine: Filter) -> dict[str, Any]:
-    """The fields of a smoothed set that the engine gives; none where it holds no state of ``lag`` steps back."""
+def smoothed(engine: Filter, posterior: Posterior) -> dict[str, Any]:
+    """The fields of the smoothed set beside a posterior; none where its data were not believed.
+
+    None either where the engine, which has published it, holds no state of ``lag`` steps back.
+    """
     lag = engine.lag
-    if not lag or engine.held_steps < lag:
+    if posterior.status == "inconsistent" or not lag or engine.held_steps < lag:
         return {}
     lower, upper = engine.smoothed_bounds(lag)
     return {
@@ -56,6 +60,11 @@ def smoothed(engine: Filter) -> dict[str, Any]:
         "support": to_message(engine.smoothed(lag)),
         "lower": lower.tolist(),
         "upper": upper.tolist(),
+        "base": posterior.reference,
+        "revision": posterior.revision,
+        "epoch": posterior.epoch,
+        "guarantee": posterior.guarantee,
+        "algorithm": posterior.algorithm if posterior.algorithm is not None else 1,
     }
 
 

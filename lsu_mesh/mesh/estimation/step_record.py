@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from lsu_mesh.filters.filter import GainOf
 from lsu_mesh.mesh.estimation.held_set import Held
 from lsu_mesh.mesh.estimation.time_update import Origin
 from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction, Reference, Smoothed
@@ -62,6 +63,7 @@ class Combined:
     origin: int | None
     cause: str | None = None
     gain: float | None = None
+    gain_of: GainOf | None = None
 
 
 def published_content(posterior: Posterior) -> tuple[object, ...]:

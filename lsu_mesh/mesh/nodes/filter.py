@@ -8,9 +8,10 @@ from dataclasses import replace
 from lsu_mesh.errors import InconsistentData
 from lsu_mesh.mesh.access import published_topics, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
+from lsu_mesh.mesh.estimation.adoption import adopted_model, filter_algorithm, is_due, make_engine
 from lsu_mesh.mesh.estimation.filter_step import (
     FilterOutcome,
+    Transfers,
     contradiction_rule,
     filter_step,
 )
@@ -18,6 +19,7 @@ from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
 from lsu_mesh.mesh.estimation.message_fields import can_foretell, described, finite_or_none, foretold, smoothed
 from lsu_mesh.mesh.estimation.received_data import ReceivedData
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
+from lsu_mesh.mesh.estimation.send_on_gain import SendOnGain
 from lsu_mesh.mesh.estimation.step_data import BEFORE_PRIOR, StepData, Unused
 from lsu_mesh.mesh.estimation.step_record import Combined, Step
 from lsu_mesh.mesh.estimation.transfer import MAX_BOX_AGE, Transfer
@@ -34,7 +36,7 @@ from lsu_mesh.mesh.messages import (
     SupportMessage,
 )
 from lsu_mesh.mesh.nodes.estimator import Estimator
-from lsu_mesh.mesh.nodes.filter_events import dropped_event, transfer_event, widened_event
+from lsu_mesh.mesh.nodes.filter_events import dropped_event, rejected_event, widened_event
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.source_timeout import input_key
 from lsu_mesh.mesh.nodes.starting import About
@@ -72,6 +74,9 @@ class FilterNode(Estimator):
         self._factor = 1.0
         """By how much r was widened in the current step."""
         self._counts["transfers rejected"] = 0
+        self._send_on_gain = SendOnGain(configuration, settings)
+        if settings.publish_when:
+            self._counts["predictions not sent"] = 0
         self._announced: Suggestion | None = None
         """Bounds that are adopted at a step to come."""
 
@@ -180,6 +185,7 @@ class FilterNode(Estimator):
             origin=origin,
             cause=outcome.cause,
             gain=outcome.gain,
+            gain_of=outcome.gain_of,
         ), messages
 
     def _adopt(self, k: int, now: int) -> list[Message]:
@@ -202,17 +208,17 @@ class FilterNode(Estimator):
         """The step's transfers and data, and what the node does where they contradict the set."""
         k, inputs, is_replay = data.k, self.timeline.inputs, step.transfers is not None
         before = self.engine.snapshot()
-        outcome = filter_step(
-            self.engine,
-            data,
+        transfers = Transfers(
             self._transfers(k, step, inputs),
-            as_set=lambda message: self._transfer.as_set(message, k, self.engine, inputs),
-            rule=contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse",
+            lambda message: self._transfer.as_set(message, k, self.engine, inputs),
+            self.settings.transfer_gain,
         )
+        rule = contradiction_rule(self.settings.on_inconsistency) if self._is_tested else "refuse"
+        outcome = filter_step(self.engine, data, transfers, rule)
         # a transfer that misses the set was told of when the step was first done
         rejected = [one for one in outcome.rejected if one.by_data or not is_replay]
         self._counts["transfers rejected"] += len(rejected)
-        messages = [transfer_event(self, k, one, now) for one in rejected]
+        messages = [rejected_event(self, k, one, now=now) for one in rejected]
         if outcome.error is None:
             if outcome.status == "ok":
                 self._agree(k)
@@ -221,15 +227,15 @@ class FilterNode(Estimator):
         if not self._is_tested:
             self.engine.restore(before)
             start = self._refuse_start(data, outcome.error, now)
-            return replace(outcome, transfers=(), gain=None), [*messages, *start]
+            return replace(outcome, transfers=(), gain=None, gain_of=None), [*messages, *start]
         if outcome.status == "ok":
             self._factor = outcome.factor
             self.held.downgrade_guarantee("learned")
-            return outcome, [*messages, widened_event(self, k, outcome.error, factor=self._factor, now=now)]
+            return outcome, [*messages, widened_event(self, k, outcome, now=now)]
         epoch = self.held.epochs.number
         messages += self._drop(data, outcome, now)
         if epoch != self.held.epochs.number:
-            outcome = replace(outcome, transfers=(), gain=None)
+            outcome = replace(outcome, transfers=(), gain=None, gain_of=None)
         return outcome, messages
 
     def _transfers(self, k: int, step: Step, inputs: Mapping[int, Input]) -> list[Prediction | Fused]:
@@ -350,37 +356,30 @@ class FilterNode(Estimator):
             missing=list(combined.missing),
             cause=combined.cause,
             gain=None if combined.gain is None else finite_or_none(combined.gain),
-            algorithm=self.engine.algorithm,
+            gain_of=combined.gain_of,
+            algorithm=filter_algorithm(self.settings, self.engine),
         )
 
     def is_told(self, step: Step) -> bool:
         """The smoothed set too is what it was: a step that is done again may change it alone."""
-        if step.published is None or step.published.status == "inconsistent":
-            return True
-        found, old = smoothed(self.engine), step.smoothed
-        return all(getattr(old, name, None) == value for name, value in found.items())
+        found = {} if step.published is None else smoothed(self.engine, step.published)
+        return all(getattr(step.smoothed, name, None) == value for name, value in found.items())
 
     def beside(self, posterior: Posterior, step: Step, now: int) -> list[Message]:
-        """The smoothed set of the same data; nothing where these were not believed."""
-        fields = smoothed(self.engine)
-        if posterior.status == "inconsistent" or not fields:
-            step.smoothed = None
+        step.smoothed, fields = None, smoothed(self.engine, posterior)
+        if not fields:
             return []
-        step.smoothed = Smoothed(
-            **self.stamp("smoothed", posterior.step - self.engine.lag, now, posterior.origin_ns),
-            **fields,
-            base=posterior.reference,
-            revision=posterior.revision,
-            epoch=posterior.epoch,
-            guarantee=posterior.guarantee,
-            algorithm=self.engine.algorithm,
-        )
+        stamp = self.stamp("smoothed", posterior.step - self.engine.lag, now, posterior.origin_ns)
+        step.smoothed = Smoothed(**stamp, **fields)
         return [step.smoothed]
 
     def prediction(self, k: int, now: int) -> list[Message]:
+        held = self.held
         if not can_foretell(self.engine, self.configuration.input_box):
             return []
-        held = self.held
+        if not self._send_on_gain.publishes(k, held, self.timeline.inputs):
+            self._counts["predictions not sent"] += 1
+            return []
         is_input_known = self.timeline.has_input(k - 1) or not self.engine.model.input_count
         return [
             Prediction(
@@ -394,6 +393,6 @@ class FilterNode(Estimator):
                 used=list(held.used),
                 bounds=self.noise_bounds(),
                 missing=[] if is_input_known else ["input"],
-                algorithm=self.engine.algorithm,
+                algorithm=filter_algorithm(self.settings, self.engine),
             )
         ]

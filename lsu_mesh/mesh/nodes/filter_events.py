@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from lsu_mesh.errors import InconsistentData
-from lsu_mesh.mesh.estimation.filter_step import RejectedTransfer
+from lsu_mesh.mesh.estimation.filter_step import FilterOutcome, RejectedTransfer
 from lsu_mesh.mesh.estimation.inconsistency import DroppedStrip
 from lsu_mesh.mesh.messages import Message
 from lsu_mesh.mesh.nodes.node import Node
@@ -26,14 +25,15 @@ def dropped_event(node: Node, k: int, strip: DroppedStrip, *, now: int) -> Messa
     return node.event("WARN", "contradiction", text, now=now, step=k, about=about)
 
 
-def transfer_event(node: Node, k: int, rejected: RejectedTransfer, now: int) -> Message:
-    """A transfer that was left out, and why."""
+def rejected_event(node: Node, k: int, rejected: RejectedTransfer, *, now: int) -> Message:
+    """A transfer that was left out, its source, and why."""
     source = rejected.message.src
     text = f"step {k}: the transfer from {source} was left out: {rejected.reason}"
     return node.event("WARN", "transfer-rejected", text, now=now, step=k, about={"source": source, "step": k})
 
 
-def widened_event(node: Node, k: int, error: InconsistentData, *, factor: float, now: int) -> Message:
-    """That r was widened in a step, by how much, and why."""
-    text = f"step {k}: {error}; r was widened by {factor:.4g} in this step, the set is no longer guaranteed"
-    return node.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": factor})
+def widened_event(node: Node, k: int, outcome: FilterOutcome, *, now: int) -> Message:
+    """r was widened in a step, so that it explains the data."""
+    widened = f"r was widened by {outcome.factor:.4g} in this step, the set is no longer guaranteed"
+    text = f"step {k}: {outcome.error}; {widened}"
+    return node.event("WARN", "widened", text, now=now, step=k, about={"step": k, "factor": outcome.factor})

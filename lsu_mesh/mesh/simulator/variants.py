@@ -30,6 +30,8 @@ IN_ITS_PLACE = ("LSUO", "LSUPB", "LSUCZ")
 """Guaranteed kinds that a constrained zonotope is drawn from."""
 LAGS = (0, 0, 0, 2)
 """Lags of constrained zonotopes that are drawn from."""
+WORTH = (0.0, 0.3, 1.1)
+"""Nats that make a prediction worth a message."""
 DOMAIN, INPUTS = 50.0, 6.0
 """Half-widths of a domain and of an input box that are true."""
 
@@ -47,11 +49,14 @@ class Variant(NamedTuple):
     """How models and sensors go by time, a name of :data:`lsu_mesh.mesh.simulator.time_variants.TIMES`."""
     lag: int = 0
     """Of constrained zonotopes, where it is not that of the configuration; no continuous model goes with it."""
+    publish_when: float = 0.0
+    """Nats that make a prediction worth a message, for every filter."""
 
     def __str__(self) -> str:
         words = [f"{name}={kind}" for name, kind in self.kinds]
         words += [f"{self.transfer[0]}.transfer={self.transfer[1]}"] if self.transfer[0] else []
         words += [f"lag={self.lag}"] if self.lag else []
+        words += [f"publish_when={self.publish_when:g}"] if self.publish_when else []
         return " ".join([*words, *filter(None, (self.extra, self.times))]) or "as it is"
 
 
@@ -100,6 +105,7 @@ def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Conf
         senders = base.fusion if way == "fused" else sound
         if senders:
             filters[name] = replace(filters[name], transfer=way, transfer_from=tuple(sorted(senders)))
+    filters = {name: replace(one, publish_when=variant.publish_when) for name, one in filters.items()}
     fusion = {name: replace(settings, **small) for name, settings in base.fusion.items()}
     return _extended(timed(replace(base, filters=filters, fusion=fusion), variant.times), variant.extra)
 

@@ -16,8 +16,8 @@ from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.held_inputs import Input as Drive
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.estimation.adoption import adopted_model, is_due, make_engine
-from lsu_mesh.mesh.estimation.filter_step import contradiction_rule, filter_step
+from lsu_mesh.mesh.estimation.adoption import adopted_model, filter_algorithm, is_due, make_engine
+from lsu_mesh.mesh.estimation.filter_step import Transfers, contradiction_rule, filter_step
 from lsu_mesh.mesh.estimation.fusion_step import OUTVOTED, Source, fusion_algorithm, fusion_engine, fusion_step
 from lsu_mesh.mesh.estimation.message_fields import described, described_box, finite_or_none, foretold, smoothed
 from lsu_mesh.mesh.estimation.open_loop import MAX_LISTED, OpenLoop
@@ -118,12 +118,11 @@ class Recomputation(ABC):
         if base.status == "inconsistent":
             raise DoesNotFit("base", f"a set of status {base.status}", "one whose data were believed")
         self._hold(base)
-        fields = smoothed(self._engine)
+        fields = smoothed(self._engine, base)
         if not fields:
             held = f"the lag is {self._engine.lag}, {self._engine.held_steps} steps are there"
             raise DoesNotFit("lag", recorded.lag, f"no smoothed set: {held}")
-        claims = {name: getattr(base, name) for name in ("revision", "epoch", "guarantee")}
-        return Recomputed({**fields, **claims, "step": base.step - self._engine.lag})
+        return Recomputed({**fields, "step": base.step - self._engine.lag})
 
     def other_algorithm(self, recorded: Posterior | Prediction | Smoothed) -> str | None:
         """The number of the arithmetic that computed a set, in words, where it is not today's: its bits may differ."""
@@ -297,7 +296,7 @@ class FilterRecomputation(Recomputation):
 
     @property
     def algorithm(self) -> tuple[str, int]:
-        return self._settings.kind, self._engine.algorithm
+        return self._settings.kind, filter_algorithm(self._settings, self._engine)
 
     def _combine(self, k: int, brought: Brought, recorded: Posterior) -> Recomputed:
         foreign = sorted({message.name for message in brought.measurements} - set(self._settings.sensors))
@@ -306,9 +305,9 @@ class FilterRecomputation(Recomputation):
         r = self._engine.model.r
         data = self._data_of_steps.gather(k, brought.measurements, r, origin=self._origin, known=brought.known)
         rule = contradiction_rule(self._settings.on_inconsistency)
-        outcome = filter_step(
-            self._engine, data, brought.transfers, as_set=lambda message: self._as_set(message, k), rule=rule
-        )
+        gain = None if recorded.gain_of is None else self._settings.transfer_gain
+        transfers = Transfers(brought.transfers, lambda message: self._as_set(message, k), gain)
+        outcome = filter_step(self._engine, data, transfers, rule)
         if outcome.rejected:
             one = outcome.rejected[0]
             raise DoesNotFit("used", f"the {one.message.topic} of {one.message.src}", f"it left out: {one.reason}")
@@ -316,6 +315,7 @@ class FilterRecomputation(Recomputation):
             **described(self._engine),
             "kind": self._settings.kind,
             "gain": None if outcome.gain is None else finite_or_none(outcome.gain),
+            "gain_of": outcome.gain_of,
             "bounds": self._noise_bounds(outcome.factor),
         }
         return Recomputed(fields, outcome.status, outcome.factor > 1.0)

@@ -21,6 +21,7 @@ from rerun.chunk import RrdReader
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.estimation.adoption import filter_algorithm
 from lsu_mesh.mesh.estimation.fusion_step import fusion_algorithm
 from lsu_mesh_services.recording.blueprint import blueprint
 from lsu_mesh_services.recording.entity_paths import EntityPaths
@@ -131,10 +132,15 @@ def run_description(configuration: Configuration) -> dict[str, str]:
 
 
 def algorithms(configuration: Configuration) -> dict[str, int]:
-    """Numbers of the arithmetic of the filters and policies of a mesh; sets of another number have other bits."""
-    kinds = {one.kind for one in configuration.filters.values()}
+    """Numbers of the arithmetic of the kinds of filters, the highest of each, and policies of a mesh.
+
+    Sets of another number have other bits.
+    """
+    numbers: dict[str, int] = {}
+    for one in sorted(configuration.filters.values(), key=lambda one: one.kind):
+        number = filter_algorithm(one, filter_class(one.kind))
+        numbers[one.kind] = max(number, numbers.get(one.kind, number))
     policies = {one.policy for one in configuration.fusion.values()}
-    numbers = {kind: filter_class(kind).algorithm for kind in sorted(kinds)}
     return numbers | {policy: fusion_algorithm(POLICIES[policy]) for policy in sorted(policies)}
 
 

@@ -143,3 +143,45 @@ def test_both_names_of_a_key_are_a_mistake(demo: Path, tmp_path: Path) -> None:
     (one,) = records(file).values()
     assert one.key == "on_contradiction"
     assert "old name of on_inconsistency" in one.text
+
+
+def test_a_transfer_is_a_word_or_a_table(demo: Path, tmp_path: Path) -> None:
+    plain = load(demo, ["filters.box.transfer=predictor"]).filters["box"]
+    assert (plain.transfer, plain.transfer_gain, plain.publish_when) == ("predictor", "hull", 0.0)
+    file = tmp_path / "mesh.toml"
+    table = 'transfer = {way = "predictor", gain = "support", publish_when = 0.5}'
+    file.write_text(demo.read_text().replace('kind = "LSUO"', f'kind = "LSUO"\n{table}'))
+    full = load(file).filters["box"]
+    assert (full.transfer, full.transfer_gain, full.publish_when) == ("predictor", "support", 0.5)
+    assert full.transfer_from == plain.transfer_from
+    sender = load(demo, ["filters.cz.transfer.publish_when=1"]).filters["cz"]
+    assert (sender.transfer, sender.publish_when) == ("off", 1.0), "who takes nothing may send on gain"
+
+
+def test_a_flag_reaches_into_a_transfer_that_is_written_as_a_word(demo: Path, tmp_path: Path) -> None:
+    file = tmp_path / "mesh.toml"
+    file.write_text(demo.read_text().replace('kind = "LSUO"', 'kind = "LSUO"\ntransfer = "predictor"'))
+    found = load(file, ["filters.box.transfer.gain=support"]).filters["box"]
+    assert (found.transfer, found.transfer_gain) == ("predictor", "support")
+    assert load(file, ["filters.box.transfer=fused"]).filters["box"].transfer == "fused"
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "expected", "words"),
+    [
+        ("transfer.publish_when=-0.1", "publish_when", "a number of nats ≥ 0", "found -0.1"),
+        ('transfer.publish_when="often"', "publish_when", "a number of nats ≥ 0", 'found "often"'),
+        ("transfer.gain=volume", "gain", 'one of "support", "hull"', '"volume" is no choice'),
+        ("transfer.gain=support", "gain", "no such key here", 'has no effect with way = "off"'),
+        ("transfer.way=predictr", "way", 'one of "off", "predictor"', 'did you mean "predictor"'),
+        ("transfer.when=1", "when", "one of gain, publish_when, way", "unknown key"),
+        ("transfer=predictr", "transfer", 'one of "off", "predictor"', 'did you mean "predictor"'),
+    ],
+)
+def test_mistakes_of_a_transfer_say_what_is_expected(
+    demo: Path, change: str, key: str, expected: str, words: str
+) -> None:
+    found = records(demo, f"filters.box.{change}")
+    assert set(found) == {key}
+    assert found[key].expected.startswith(expected)
+    assert words in found[key].text

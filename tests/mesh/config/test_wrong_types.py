@@ -39,6 +39,7 @@ TAKEN: dict[str, set[str]] = {
     "sensors.*.simulated_r": {"empty list"}, "sensors.*.faults": {"empty list"},
     "sensors.s1.faults[0].from": WHOLE, "sensors.s1.faults[0].size": NUMBER,
     "filters.*.history": WHOLE, "filters.*.transfer_from": {"empty list"}, "filters.*.reset_after": WHOLE,
+    "filters.*.transfer.publish_when": {*POSITIVE, "zero"},
     "filters.*.box": FLAG, "filters.*.scaled": FLAG, "filters.*.reduce": FLAG,
     "filters.*.meet": FLAG, "filters.*.max_generators": WHOLE, "filters.*.max_constraints": {"whole", "zero"},
     "filters.*.order": WHOLE, "filters.*.window": WHOLE, "filters.*.unknown": {"empty list"},

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import msgspec
 import numpy as np
 import pytest
 
-from lsu_mesh.mesh.messages import Prediction
+from lsu_mesh import LSUCZ, LSUModel, Orthotope, Parallelotope
+from lsu_mesh.filters.filter import GainOf
+from lsu_mesh.filters.held_inputs import HeldInputs
+from lsu_mesh.mesh.estimation.filter_step import Transfers, filter_step
+from lsu_mesh.mesh.estimation.step_data import StepData
+from lsu_mesh.mesh.messages import Posterior, Prediction
+from lsu_mesh.mesh.verification import verify
 
 MakeMesh = Callable[..., Any]
 STEPS = 60
@@ -44,8 +51,10 @@ def test_transfer_narrows_every_filter_and_keeps_the_truth(mesh_of: MakeMesh, wa
         assert holds_truth(mesh, name)
         assert mean_width(mesh, name) < 0.97 * mean_width(alone, name), name
         late = [p for k, p in mesh.newest(name).items() if k > 2]
-        assert all(p.gain is not None and p.gain >= 0 for p in late)
-        assert any(p.gain > 0.1 for p in late)
+        assert {p.gain_of for p in late} == {"hull"}
+        assert sum(p.gain is not None for p in late) > 0.9 * len(late), "nil where the hulls do not show what was cut"
+        assert all(p.gain >= 0 for p in late if p.gain is not None)
+        assert any(p.gain > 0.1 for p in late if p.gain is not None)
         topic = "prediction" if way == "predictor" else "fused"
         assert all(any(reference[0] == topic for reference in p.used) for p in late)
     assert holds_truth(mesh, "main")
@@ -59,7 +68,38 @@ def test_transfers_come_before_the_data_in_the_provenance(mesh_of: MakeMesh) -> 
 
 def test_without_transfer_there_is_no_gain(mesh_of: MakeMesh) -> None:
     mesh = finished(mesh_of(f"mesh.steps={STEPS}"))
-    assert all(p.gain is None for p in mesh.posteriors("box"))
+    assert {(p.gain, p.gain_of) for p in mesh.posteriors("box")} == {(None, None)}
+
+
+def test_a_node_measures_by_supports_where_it_is_told_to(mesh_of: MakeMesh) -> None:
+    names = ("box", "para", "cz")
+    changes = [f'filters.{name}.transfer.gain="support"' for name in names]
+    mesh = finished(mesh_of(f"mesh.steps={STEPS}", *transfers("predictor", *names), *changes))
+    for name in names:
+        late = [p for k, p in mesh.newest(name).items() if k > 2]
+        assert {p.gain_of for p in late} == {"support"}
+        assert all(p.gain >= 0 for p in late)
+    found = verify(mesh.configuration, [message for _, message in mesh.sent])
+    assert found.holds
+    assert not found.unverifiable
+    lie = [
+        msgspec.structs.replace(m, gain_of="hull") if isinstance(m, Posterior) and m.gain_of else m
+        for _, m in mesh.sent
+    ]
+    assert {one.field for one in verify(mesh.configuration, lie).differences} == {"gain_of"}
+
+
+def test_a_cut_that_no_hull_shows_is_not_published_as_nothing() -> None:
+    """A constrained zonotope cut by a diagonal band that touches all sides of its hull."""
+    engine = LSUCZ(LSUModel(np.eye(2), None, [[1.0, 1.0]], 0.1, 0.1), Orthotope([-1.0, -1.0], [1.0, 1.0]))
+    band, start = Parallelotope([0.0, 0.0], [[1.0, 0.1], [-1.0, 0.1]]), engine.snapshot()
+    nothing, some = np.array([np.nan]), cast("Prediction", None)
+    no_data = StepData(1, 0, 0, data=(), y=nothing, r=nothing, u=None, inputs=HeldInputs([], []))
+    choices: list[tuple[GainOf, Any]] = [("hull", None), ("support", pytest.approx(1.6607, abs=1e-4))]
+    for gain, expected in choices:
+        engine.restore(start)
+        outcome = filter_step(engine, no_data, Transfers([some], lambda _: band, gain), "drop")
+        assert (outcome.gain, outcome.gain_of) == (expected, gain)
 
 
 def test_predictors_are_taken_only_from_those_named(mesh_of: MakeMesh) -> None:

@@ -15,7 +15,7 @@ SETS = {"demo": 420, "transfer": 420, "liar": 635, "learning": 990, "every_optio
 OUTDATED: dict[str, dict[str, int]] = {
     "demo": {"LSUP algorithm 1, this is 3": 120, "intersect algorithm 1, this is 3": 42},
     "transfer": {
-        "LSUCZ algorithm 1, this is 3": 2,
+        "LSUCZ algorithm 1, this is 4": 2,
         "LSUP algorithm 1, this is 3": 120,
         "intersect algorithm 1, this is 3": 35,
     },
