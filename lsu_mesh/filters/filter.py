@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Vector
+from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.density import Density
 from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.model import LSUModel
@@ -44,6 +45,8 @@ class Filter(ABC):
     """Number of the arithmetic of :meth:`condition` alone; what a filter with transfers publishes rises with it."""
     skips_met: bool = True
     """Whether a set that holds the one met last is left out; a fusion, whose sources may be equal, goes through all."""
+    smooths: ClassVar[bool] = False
+    """Whether the class has the option ``lag`` and holds the sets of so many earlier states too."""
     guarantee: ClassVar[Guarantee]
     """``"declared"``: the sets hold the state as long as the declared bounds do. ``"none"``: they are estimates.
 
@@ -192,6 +195,32 @@ class Filter(ABC):
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull ``(lower, upper)`` of the state now."""
         return self.support.bounds()
+
+    @property
+    def lag(self) -> int:
+        """L: so many steps back :meth:`smoothed` goes; 0 where the class does not smooth."""
+        return 0
+
+    @property
+    def held_steps(self) -> int:
+        """So many steps back states are held now, at most :attr:`lag`; fewer after a start."""
+        return 0
+
+    def smoothed(self, steps: int) -> Support:
+        """The set of x_{k−steps} given all data so far, ``0 ≤ steps ≤ held_steps``; else ``ModelError``."""
+        self._check_held(steps)
+        return self.support
+
+    def smoothed_bounds(self, steps: int) -> tuple[Vector, Vector]:
+        """Bounds (n,), (n,) of x_{k−steps} given all data so far; ``ModelError`` as :meth:`smoothed`."""
+        self._check_held(steps)
+        return self.bounds()
+
+    def _check_held(self, steps: int) -> None:
+        if not 0 <= steps <= self.held_steps:
+            raise ModelError(
+                f"the set of {steps} steps ago is not held: the lag is {self.lag}, {self.held_steps} steps are there"
+            )
 
     def volume(self) -> float:
         """Volume of :attr:`support`."""

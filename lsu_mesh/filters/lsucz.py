@@ -79,6 +79,7 @@ class LSUCZ(Filter):
     kind: ClassVar[str] = "LSUCZ"
     algorithm: ClassVar[int] = 3
     guarantee: ClassVar[Guarantee] = "declared"
+    smooths: ClassVar[bool] = True
     conditioning: ClassVar[int] = 2
     _held: Held
     _support: ConstrainedZonotope | None
@@ -121,6 +122,11 @@ class LSUCZ(Filter):
     def lag(self) -> int:
         """L: so many steps back :meth:`smoothed` goes."""
         return self._lag
+
+    @property
+    def held_steps(self) -> int:
+        """So many steps back states are held now, at most :attr:`lag`; fewer after a start."""
+        return self._depth - 1
 
     @property
     def support(self) -> ConstrainedZonotope:
@@ -334,11 +340,7 @@ class LSUCZ(Filter):
         return self._held.lower.size // self._model.state_count
 
     def _place(self, steps: int) -> int:
-        if not 0 <= steps < self._depth:
-            held = self._depth - 1
-            raise ModelError(
-                f"the set of {steps} steps ago is not held: the lag is {self._lag}, {held} steps are there"
-            )
+        self._check_held(steps)
         return steps
 
     def _stack_bounds(self) -> tuple[Vector, Vector]:

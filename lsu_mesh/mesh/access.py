@@ -10,12 +10,12 @@ from lsu_mesh.mesh.keys import TOPICS, key, last_key, model_key
 PUBLISHES = {
     "plant": ("truth", "input"),
     "sensor": ("measurement",),
-    "filter": ("prediction", "posterior"),
+    "filter": ("prediction", "smoothed", "posterior"),
     "fusion": ("fused",),
     "identifier": ("bounds",),
     "recorder": (),
 }
-"""Topics of each role, besides those of every peer."""
+"""Topics of each role, the one that tells its steps last, besides those of every peer."""
 EVERY_PEER = ("health", "event")
 
 
@@ -31,6 +31,12 @@ class Access(NamedTuple):
 def truth_is_known(configuration: Configuration) -> bool:
     """Whether the plant tells its state: a sensor is simulated on it. Real measurements come without a truth."""
     return configuration.plant is not None and any(one.file is None for one in configuration.sensors.values())
+
+
+def published_topics(configuration: Configuration, role: str, name: str) -> tuple[str, ...]:
+    """Topics of one peer, besides those of every peer: a filter without a lag publishes no smoothed sets."""
+    smooths = role == "filter" and configuration.filters[name].lag > 0
+    return tuple(topic for topic in PUBLISHES[role] if topic != "smoothed" or smooths)
 
 
 def subscriptions(configuration: Configuration, role: str, name: str) -> list[tuple[str, str]]:
@@ -52,7 +58,7 @@ def subscriptions(configuration: Configuration, role: str, name: str) -> list[tu
 def access(configuration: Configuration, role: str, name: str) -> Access:
     """All that a peer of the configuration may do on the mesh."""
     mesh = configuration.mesh.name
-    topics = (*PUBLISHES[role], *EVERY_PEER)
+    topics = (*published_topics(configuration, role, name), *EVERY_PEER)
     if role == "recorder":
         reads = tuple(key(mesh, topic, "*") for topic in TOPICS if topic != "live")
     else:

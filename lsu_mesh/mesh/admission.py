@@ -21,6 +21,7 @@ from lsu_mesh.mesh.messages import (
     Posterior,
     Prediction,
     Refused,
+    Smoothed,
     Suggestion,
     SupportMessage,
     Truth,
@@ -33,6 +34,7 @@ ROLE_OF_TOPIC = {
     "measurement": "sensor",
     "prediction": "filter",
     "posterior": "filter",
+    "smoothed": "filter",
     "fused": "fusion",
     "bounds": "identifier",
 }
@@ -189,7 +191,7 @@ class Admission:
             found, expected = len(message.u), self._inputs
         elif isinstance(message, Measurement):
             found, expected = len(message.y), self._rows[name]
-        elif isinstance(message, Prediction | Posterior | Fused):
+        elif isinstance(message, Prediction | Posterior | Smoothed):
             found, expected = len(message.lower), self._states
         elif isinstance(message, Suggestion):
             found, expected = len(message.rho), self._noises
@@ -208,7 +210,10 @@ class Admission:
         if isinstance(message, Fused) and message.policy not in POLICIES:
             known = ", ".join(POLICIES)
             raise Refused("policy", f"fused by policy {message.policy!r}, which this peer does not know ({known})")
-        if isinstance(message, Prediction | Posterior) and complexity(message.support) > self._most_generators:
+        if (
+            isinstance(message, Prediction | Posterior | Smoothed)
+            and complexity(message.support) > self._most_generators
+        ):
             raise Refused("complexity", f"more than {self._most_generators} generators or constraints")
 
     def _is_new(self, key: str, message: Message) -> bool:
@@ -235,7 +240,8 @@ def most_generators(configuration: Configuration) -> int:
     for settings in configuration.filters.values():
         options = settings.options
         n, is_unlimited = model.state_count, options.get("reduce") is False
-        limits.append(UNLIMITED if is_unlimited else options.get("max_generators") or max(20, 3 * n))
+        usual = max(20, 3 * n) + n * settings.lag
+        limits.append(UNLIMITED if is_unlimited else options.get("max_generators") or usual)
         limits.append(UNLIMITED if is_unlimited else int(options.get("order") or max(15, 3 * n)) * n)
     return min(UNLIMITED, 2 * max(limits, default=0) + 2 * model.state_count + model.rho.size + 64)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lsu_mesh.mesh.access import EVERY_PEER, PUBLISHES, subscriptions
+from lsu_mesh.mesh.access import EVERY_PEER, PUBLISHES, published_topics, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 
 Peer = tuple[str, str]
@@ -36,11 +36,11 @@ def in_order(configuration: Configuration) -> list[Peer]:
 def flows(configuration: Configuration) -> list[Flow]:
     """Every key that peers of the configuration publish: sources first, health and events last.
 
-    A plant without inputs publishes none. A recorder reads everything.
+    A plant without inputs publishes none, a filter without a lag no smoothed sets. A recorder reads everything.
     """
     peers = in_order(configuration)
     listened = {peer: set(subscriptions(configuration, *peer)) for peer in peers}
-    own = [(role, name, topic) for role, name in peers for topic in PUBLISHES[role]]
+    own = [(role, name, topic) for role, name in peers for topic in published_topics(configuration, role, name)]
     told = [(role, name, topic) for topic in EVERY_PEER for role, name in peers]
     if not configuration.base_model.input_count:
         own = [(role, name, topic) for role, name, topic in own if topic != "input"]

@@ -7,7 +7,10 @@ import re
 from typing import NamedTuple
 
 PREFIX = "lsu/v1"
-TOPICS = ("truth", "input", "measurement", "prediction", "posterior", "fused", "bounds", "health", "event", "live")
+TOPICS = (
+    "truth", "input", "measurement", "prediction", "posterior", "smoothed", "fused", "bounds", "health", "event",
+    "live",
+)  # fmt: skip
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 MAX_LENGTH = len(PREFIX) + 3 * 65
 """Longest key in characters."""

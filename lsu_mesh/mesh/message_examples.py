@@ -47,6 +47,16 @@ def example(topic: str) -> Message:
             "point_rule": "mean",
         },
         "posterior": estimate,
+        "smoothed": bounds
+        | {
+            "support": box,
+            "lag": 5,
+            "base": ("posterior", "filter/box", "0123456789abcdef", 46),
+            "revision": 0,
+            "epoch": 0,
+            "guarantee": "declared",
+            "algorithm": 1,
+        },
         "fused": estimate
         | {
             "mean": None,

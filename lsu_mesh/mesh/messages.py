@@ -303,6 +303,29 @@ class Posterior(Message, frozen=True, kw_only=True):
             _check_matrix("covariance", self.covariance, len(self.lower), len(self.lower))
 
 
+class Smoothed(Message, frozen=True, kw_only=True):
+    """Support of the state ``lag`` steps back, given all data up to then: ``step`` is that of the state."""
+
+    topic = "smoothed"
+    support: SupportMessage
+    lower: Numbers
+    upper: Numbers
+    lag: Count
+    """Steps from the state to the newest data."""
+    base: Reference
+    """The posterior of step ``step + lag``, whose filter holds this set too."""
+    revision: Count
+    """Of ``base``; like the two below."""
+    epoch: Count
+    guarantee: Guarantee
+    algorithm: Count
+
+    def __post_init__(self) -> None:
+        Message.__post_init__(self)
+        _check_box(self.lower, self.upper)
+        _check_dimension(self.support, self.lower)
+
+
 class Rejection(_Strict, frozen=True, kw_only=True):
     """A source that was left out of a fused set, and why."""
 
@@ -377,7 +400,8 @@ class Event(Message, frozen=True, kw_only=True):
 
 
 TYPES: dict[str, type[Message]] = {
-    kind.topic: kind for kind in (Truth, Input, Measurement, Prediction, Posterior, Fused, Suggestion, Health, Event)
+    kind.topic: kind
+    for kind in (Truth, Input, Measurement, Prediction, Posterior, Smoothed, Fused, Suggestion, Health, Event)
 }
 _DECODERS: dict[str, msgspec.msgpack.Decoder[Any]] = {
     topic: msgspec.msgpack.Decoder(kind, strict=True) for topic, kind in TYPES.items()

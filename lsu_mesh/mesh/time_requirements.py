@@ -26,6 +26,11 @@ def time_problems(configuration: Configuration, role: str, name: str) -> list[st
             )
         if has_more_models and settings.adopt:
             found.append(f"filter {name}: adopt needs one discrete model, bounds of a step are no rates; remove it")
+        if configuration.continuous is not None and settings.lag:
+            found.append(
+                f"filter {name}: lag counts time updates, and a step of a continuous model may take several, to each "
+                "datum between the steps; leave lag out, or give a discrete model"
+            )
         if configuration.continuous is not None and settings.transfer == "data-predictor":
             found.append(
                 f'filter {name}: "data-predictor" knows outputs of the grid only; transfer = "predictor" or "fused"'

@@ -16,7 +16,8 @@ from lsu_mesh.mesh.messages import TYPES, decode, encode, read
 DATA = Path(__file__).parent / "data"
 FIRST = "payloads-0.1/first.jsonl"
 """Made before any field was added."""
-NEWEST = "payloads-0.1/with-densities.jsonl"
+NEWEST = "payloads-0.1/with-smoothing.jsonl"
+LATER_TOPICS = {FIRST: {"smoothed"}, NEWEST: set()}
 
 
 def kept(file: Path) -> list[dict[str, Any]]:
@@ -54,7 +55,7 @@ def in_words(fields: dict[str, Any]) -> str:
 @pytest.mark.parametrize("file", [FIRST, NEWEST])
 def test_every_topic_and_set_of_a_version_is_kept(file: str) -> None:
     lines = kept(DATA / file)
-    assert {line["topic"] for line in lines} == set(TYPES)
+    assert {line["topic"] for line in lines} == set(TYPES) - LATER_TOPICS[file]
     supports = [line["fields"]["support"] for line in lines if "support" in line["fields"]]
     assert {support["type"] for support in supports} == {
         "orthotope", "parallelotope", "zonotope", "constrained_zonotope", "intersection",

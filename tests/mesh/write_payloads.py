@@ -68,6 +68,10 @@ def cases() -> Iterator[tuple[str, str, Fields]]:
     for name in SETS:
         yield f"prediction, {name}", "prediction", predicted | {"support": typed(name), "missing": ["input"]}
         yield f"posterior, {name}", "posterior", POSTERIOR | {"support": typed(name)}
+    yield "smoothed", "smoothed", ESTIMATE | {
+        "src": "filter/box", "support": typed("constrained_zonotope"), "lag": 5, "revision": 1,
+        "base": ["posterior", "filter/box", "0123456789abcdef", 46],
+    }  # fmt: skip
     parts = {"type": "intersection", "parts": [typed(name) for name in SETS]}
     yield "posterior, intersection", "posterior", POSTERIOR | {"support": parts}
     for base in ("prior", "reach", "domain", "sources"):

@@ -15,6 +15,7 @@ import numpy as np
 from lsu_mesh.filters.filter import GainOf
 from lsu_mesh.filters.grid import OffGrid
 from lsu_mesh.filters.point_rule import PointRule
+from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config.digest import digest
 from lsu_mesh.mesh.config.problem import Problem
 from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
@@ -135,6 +136,11 @@ class FilterSettings:
     """Whose volumes the published gain of transfers compares."""
     publish_when: float = 0.0
     """Nats that a prediction has to gain on what others hold of the one published last; 0: each is published."""
+
+    @property
+    def lag(self) -> int:
+        """L of fixed-lag smoothing, the option of a class that smooths; 0: it publishes no smoothed sets."""
+        return int(self.options.get("lag", 0)) if filter_class(self.kind).smooths else 0
 
 
 @dataclass(frozen=True)

@@ -76,6 +76,13 @@ class FilterOutcome:
     dropped: Dropped | None = None
     strips: Sequence[DroppedStrip] = ()
 
+    @property
+    def cause(self) -> str | None:
+        """How the data contradict the set and what was done, in words; ``None`` where they do not."""
+        if self.error is None:
+            return None
+        return f"{self.error}; r widened by {self.factor:.6g}" if self.status == "ok" else str(self.error)
+
 
 def contradiction_rule(choice: OnInconsistency) -> Rule:
     """What a step does by ``on_contradiction``; a reset is the node's affair, several steps later."""

@@ -12,6 +12,7 @@ from lsu_mesh.filters.density import Density
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.mesh.messages import Posterior
+from lsu_mesh.mesh.sets import to_message
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.parallelotope import Parallelotope
 
@@ -64,6 +65,28 @@ def density_of(message: Posterior) -> Density | None:
     if message.mean is None or message.covariance is None:
         return None
     return Density(np.array(message.mean), np.array(message.covariance).reshape(len(message.mean), -1))
+
+
+def smoothed(engine: Filter, posterior: Posterior) -> dict[str, Any]:
+    """The fields of the smoothed set beside a posterior; none where its data were not believed.
+
+    None either where the engine, which has published it, holds no state of ``lag`` steps back.
+    """
+    lag = engine.lag
+    if posterior.status == "inconsistent" or not lag or engine.held_steps < lag:
+        return {}
+    lower, upper = engine.smoothed_bounds(lag)
+    return {
+        "lag": lag,
+        "support": to_message(engine.smoothed(lag)),
+        "lower": lower.tolist(),
+        "upper": upper.tolist(),
+        "base": posterior.reference,
+        "revision": posterior.revision,
+        "epoch": posterior.epoch,
+        "guarantee": posterior.guarantee,
+        "algorithm": posterior.algorithm if posterior.algorithm is not None else 1,
+    }
 
 
 def described_fusion(lower: Vector, upper: Vector, point: Vector, rule: PointRule) -> dict[str, Any]:

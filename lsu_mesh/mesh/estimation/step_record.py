@@ -9,7 +9,7 @@ from typing import Literal
 from lsu_mesh.filters.filter import GainOf
 from lsu_mesh.mesh.estimation.held_set import Held
 from lsu_mesh.mesh.estimation.time_update import Origin
-from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction, Reference
+from lsu_mesh.mesh.messages import Fused, Input, Measurement, Message, Posterior, Prediction, Reference, Smoothed
 
 Status = Literal["ok", "predicted", "inconsistent", "restarted"]
 
@@ -33,6 +33,8 @@ class Step:
     """Whether its data were combined once; they are never waited for again."""
     revision: int = -1
     published: Posterior | None = None
+    smoothed: Smoothed | None = None
+    """What was published with it of the state some steps back."""
 
     def takes(self, message: Measurement) -> bool:
         """Note a measurement; False for one with the moment and the values of another of its sensor, a copy."""

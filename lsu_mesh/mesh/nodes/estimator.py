@@ -80,6 +80,14 @@ class Estimator(StartingNode):
         """What a posterior says besides its set and makes it worth telling again."""
         return ()
 
+    def is_told(self, step: Step) -> bool:
+        """Whether what was published beside the step's posterior still holds."""
+        return True
+
+    def beside(self, posterior: Posterior, step: Step, now: int) -> list[Message]:
+        """What is published with a posterior, of the same data."""
+        return []
+
     def prediction(self, k: int, now: int) -> list[Message]:
         """Messages about the set before the data of step k."""
         return []
@@ -194,7 +202,7 @@ class Estimator(StartingNode):
             self._counts["behind"] += 1
             return messages
         posterior = self._publish(k, step, combined, now)
-        return messages if posterior is None else [*messages, posterior]
+        return messages if posterior is None else [*messages, posterior, *self.beside(posterior, step, now)]
 
     def _publish(self, k: int, step: Step, combined: Combined, now: int) -> Posterior | None:
         """The posterior's message, or None when the step was published before with the same set and sources."""
@@ -203,7 +211,8 @@ class Estimator(StartingNode):
         box = tuple(bound.tolist() for bound in self.published_bounds())
         beside = tuple(told_density(self.engine.density).values())
         claims = (combined.status, held.epochs.number, held.descent, held.guarantee, list(combined.missing))
-        if old is not None and (support, box, beside, *claims, *self.content()) == published_content(old):
+        told = (support, box, beside, *claims, *self.content())
+        if old is not None and told == published_content(old) and self.is_told(step):
             held.record_published(old)
             return None
         step.revision += 1

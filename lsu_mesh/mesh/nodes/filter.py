@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lsu_mesh.errors import InconsistentData
-from lsu_mesh.mesh.access import PUBLISHES, subscriptions
+from lsu_mesh.mesh.access import published_topics, subscriptions
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.adoption import adopted_model, filter_algorithm, is_due, make_engine
 from lsu_mesh.mesh.estimation.filter_step import (
@@ -16,7 +16,7 @@ from lsu_mesh.mesh.estimation.filter_step import (
     filter_step,
 )
 from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
-from lsu_mesh.mesh.estimation.message_fields import can_foretell, described, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.message_fields import can_foretell, described, finite_or_none, foretold, smoothed
 from lsu_mesh.mesh.estimation.received_data import ReceivedData
 from lsu_mesh.mesh.estimation.restart import RestartSearch, Start
 from lsu_mesh.mesh.estimation.send_on_gain import SendOnGain
@@ -31,6 +31,7 @@ from lsu_mesh.mesh.messages import (
     Message,
     Posterior,
     Prediction,
+    Smoothed,
     Suggestion,
     SupportMessage,
 )
@@ -46,12 +47,12 @@ class FilterNode(Estimator):
     """Runs one filter of the library on the measurements of its sensors."""
 
     role = "filter"
-    publishes = PUBLISHES["filter"]
     answers = ("posterior",)
 
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         settings = configuration.filters[name]
         self.settings = settings
+        self.publishes = published_topics(configuration, self.role, name)
         model = configuration.model(settings.sensors)
         super().__init__(
             configuration,
@@ -182,7 +183,7 @@ class FilterNode(Estimator):
             used=used,
             missing=missing,
             origin=origin,
-            cause=self._cause(outcome),
+            cause=outcome.cause,
             gain=outcome.gain,
             gain_of=outcome.gain_of,
         ), messages
@@ -247,13 +248,6 @@ class FilterNode(Estimator):
             self._transfer.forget_before(k - MAX_BOX_AGE)
         return [message for message in step.transfers if not self.held.epochs.is_abandoned(message)]
 
-    @staticmethod
-    def _cause(outcome: FilterOutcome) -> str | None:
-        if outcome.error is None:
-            return None
-        is_widened = outcome.status == "ok"
-        return f"{outcome.error}; r widened by {outcome.factor:.6g}" if is_widened else str(outcome.error)
-
     def _agree(self, k: int) -> None:
         self._inconsistent.clear()
         self._is_tested = self._is_tested or k > self._started_at
@@ -283,9 +277,8 @@ class FilterNode(Estimator):
             self._hold(start)
             data.update(self.engine)
             text = f"step {k}: {count} steps in a row contradicted the set; started again from {start.words}"
-            return self.event(
-                "ERROR", "reset", text, now=now, step=k, about={"step": k, "epoch": self.held.epochs.number}
-            )
+            about: About = {"step": k, "epoch": self.held.epochs.number}
+            return self.event("ERROR", "reset", text, now=now, step=k, about=about)
         text = (
             f"step {k}: {count} steps in a row contradicted the set and there is nothing sound to "
             "start again from; give the model a domain, or check the declared bounds"
@@ -311,11 +304,8 @@ class FilterNode(Estimator):
             return []
         self._hold(start)
         text = f"step {k}: started again from {start.words}"
-        return [
-            self.event(
-                "INFO", "found-start", text, now=now, step=k, about={"step": k, "epoch": self.held.epochs.number}
-            )
-        ]
+        about: About = {"step": k, "epoch": self.held.epochs.number}
+        return [self.event("INFO", "found-start", text, now=now, step=k, about=about)]
 
     def _abandon(self, data: StepData, why: str, about: About, now: int) -> Message:
         """A new epoch at once, so that others learn of it; held is something sound, or nothing that may be believed."""
@@ -369,6 +359,19 @@ class FilterNode(Estimator):
             gain_of=combined.gain_of,
             algorithm=filter_algorithm(self.settings, self.engine),
         )
+
+    def is_told(self, step: Step) -> bool:
+        """The smoothed set too is what it was: a step that is done again may change it alone."""
+        found = {} if step.published is None else smoothed(self.engine, step.published)
+        return all(getattr(step.smoothed, name, None) == value for name, value in found.items())
+
+    def beside(self, posterior: Posterior, step: Step, now: int) -> list[Message]:
+        step.smoothed, fields = None, smoothed(self.engine, posterior)
+        if not fields:
+            return []
+        stamp = self.stamp("smoothed", posterior.step - self.engine.lag, now, posterior.origin_ns)
+        step.smoothed = Smoothed(**stamp, **fields)
+        return [step.smoothed]
 
     def prediction(self, k: int, now: int) -> list[Message]:
         held = self.held

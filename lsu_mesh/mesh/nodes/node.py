@@ -56,7 +56,7 @@ class Node(ABC):
     """
 
     role: ClassVar[str]
-    publishes: ClassVar[tuple[str, ...]] = ()
+    publishes: tuple[str, ...] = ()
     """Topics that the node publishes, besides health and events."""
     takes_at_once: ClassVar[int] = 2048
     """Messages that the service around the node hands over before the next tick, however many more are waiting."""

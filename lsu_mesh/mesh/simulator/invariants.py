@@ -19,6 +19,7 @@ from lsu_mesh.mesh.messages import (
     Posterior,
     Prediction,
     Reference,
+    Smoothed,
     Truth,
 )
 from lsu_mesh.mesh.nodes.node import Node
@@ -92,10 +93,12 @@ class Invariants:
     def published(self, node: Node, message: Message) -> None:
         """A process has published; every message must be true."""
         self._check_sequence(node, message)
-        if isinstance(message, Prediction | Posterior):
+        if isinstance(message, Prediction | Posterior | Smoothed):
             self._check_truth(message)
         if isinstance(message, Posterior):
             self._check_posterior(node, message)
+        elif isinstance(message, Smoothed):
+            self._check_smoothed(node, message)
         elif isinstance(message, Truth):
             self._check_same(message, message.x)
         elif isinstance(message, Input):
@@ -131,7 +134,7 @@ class Invariants:
             text = f"{message.src} sent step {message.step} as {values}, before as {first}"
             raise InvariantBroken("restart", text)
 
-    def _check_truth(self, message: Prediction | Posterior) -> None:
+    def _check_truth(self, message: Prediction | Posterior | Smoothed) -> None:
         if message.step > len(self._truth) or (self._has_estimates and message.guarantee != "declared"):
             return  # estimates may miss the truth, and where all filters are guaranteed every set has to hold it
         self.sets += 1
@@ -156,6 +159,13 @@ class Invariants:
         life.revisions[message.step] = expected + 1
         self._provenance.check(message, life.taken)
         self.newest.setdefault(node.name, {})[message.step] = message
+
+    def _check_smoothed(self, node: Node, message: Smoothed) -> None:
+        """It belongs to the newest set of its process, ``lag`` steps later."""
+        base = self.newest.get(node.name, {}).get(message.step + message.lag)
+        if base is None or (base.reference, base.revision) != (message.base, message.revision):
+            text = f"{message.src} step {message.step}: made from {message.base}, the newest set of its step is another"
+            raise InvariantBroken("smoothed", text)
 
     def _check_flushed(self, node: RecorderSink, message: Health) -> None:
         """Every message that is counted as flushed is stored, from the first that this recorder received."""

@@ -20,7 +20,7 @@ from lsu_mesh.mesh.simulator.faults import FaultPlan, draw_plan
 from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.mesh import SimulatedMesh
 from lsu_mesh.mesh.simulator.time_variants import draw_times
-from lsu_mesh.mesh.simulator.variants import WORTH, Variant, configured, draw_variant
+from lsu_mesh.mesh.simulator.variants import WORTH, Variant, configured, draw_lag, draw_variant
 
 TRAJECTORIES = 4
 """So many different trajectories of the plant; the fault-free run of each is kept."""
@@ -56,7 +56,8 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
     base = configured(file, steps, 0, Variant())
     variant = draw_variant(rng, base)
     if variant.kinds:
-        variant = variant._replace(times=draw_times(random.Random(f"{seed}/times"), base))
+        times = draw_times(random.Random(f"{seed}/times"), base)
+        variant = variant._replace(times=times, lag=draw_lag(random.Random(f"{seed}/lag"), times))
         if variant.transfer[1] == "predictor":
             variant = variant._replace(publish_when=random.Random(f"{seed}/worth").choice(WORTH))
     trajectory = rng.randrange(TRAJECTORIES)

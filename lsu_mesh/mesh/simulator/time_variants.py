@@ -17,6 +17,8 @@ from lsu_mesh.supports.orthotope import Orthotope
 ON_THE_GRID = 0.5
 """Share of the runs in which times are those of the configuration."""
 TIMES = ("continuous", "own moments", "erring clocks", "late inputs", "rates", "schedule")
+GRID_TIMES = ("", "rates", "schedule")
+"""Those of discrete models, in which a step is one time update."""
 RHYTHMS: Sequence[tuple[float, float]] = ((0.3, 0.1), (10.0 / 7.0, 0.0), (4.0, 16.0))
 """Period and jitter of sensors in steps: several per step, out of step, and irregular."""
 CLOCK_ERROR, INPUT_DELAY = 0.05, 0.2

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.config.settings import FilterSettings, ScheduledModel, TransferWay
-from lsu_mesh.mesh.simulator.time_variants import timed, with_flow
+from lsu_mesh.mesh.simulator.time_variants import GRID_TIMES, timed, with_flow
 from lsu_mesh.supports.orthotope import Orthotope
 
 RATE = 20.0
@@ -28,6 +28,8 @@ MAX_GENERATORS, MAX_CONSTRAINTS = 6, 1
 """Limits of constrained zonotopes in the other runs; at least one generator for each state."""
 IN_ITS_PLACE = ("LSUO", "LSUPB", "LSUCZ")
 """Guaranteed kinds that a constrained zonotope is drawn from."""
+LAGS = (0, 0, 0, 2)
+"""Lags of constrained zonotopes that are drawn from."""
 WORTH = (0.0, 0.3, 1.1)
 """Nats that make a prediction worth a message."""
 DOMAIN, INPUTS = 50.0, 6.0
@@ -45,12 +47,15 @@ class Variant(NamedTuple):
     """``domain`` or ``input_box``."""
     times: str = ""
     """How models and sensors go by time, a name of :data:`lsu_mesh.mesh.simulator.time_variants.TIMES`."""
+    lag: int = 0
+    """Of constrained zonotopes, where it is not that of the configuration; no continuous model goes with it."""
     publish_when: float = 0.0
     """Nats that make a prediction worth a message, for every filter."""
 
     def __str__(self) -> str:
         words = [f"{name}={kind}" for name, kind in self.kinds]
         words += [f"{self.transfer[0]}.transfer={self.transfer[1]}"] if self.transfer[0] else []
+        words += [f"lag={self.lag}"] if self.lag else []
         words += [f"publish_when={self.publish_when:g}"] if self.publish_when else []
         return " ".join([*words, *filter(None, (self.extra, self.times))]) or "as it is"
 
@@ -68,6 +73,11 @@ def draw_variant(rng: random.Random, base: Configuration) -> Variant:
     return Variant(kinds, transfer, rng.choice(("", "", "", "domain", "input_box")))
 
 
+def draw_lag(rng: random.Random, times: str) -> int:
+    """The lag of the constrained zonotopes of one run."""
+    return rng.choice(LAGS) if times in GRID_TIMES else 0
+
+
 def _draw_kind(rng: random.Random, kind: str) -> str:
     return rng.choice(IN_ITS_PLACE) if kind == "LSUCZ" else kind
 
@@ -82,7 +92,8 @@ def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Conf
         "max_generators": max(MAX_GENERATORS, base.base_model.state_count),
         "max_constraints": MAX_CONSTRAINTS,
     }
-    filters = {name: _of_kind(base.filters[name], kind, small) for name, kind in variant.kinds}
+    filters = {name: _of_kind(base.filters[name], kind, _with_lag(base, name, small, variant.lag))
+               for name, kind in variant.kinds}  # fmt: skip
     name, way = variant.transfer
     if name:
         # only sets that are guaranteed: an estimate that misses the truth would accuse a true measurement
@@ -97,6 +108,13 @@ def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Conf
     filters = {name: replace(one, publish_when=variant.publish_when) for name, one in filters.items()}
     fusion = {name: replace(settings, **small) for name, settings in base.fusion.items()}
     return _extended(timed(replace(base, filters=filters, fusion=fusion), variant.times), variant.extra)
+
+
+def _with_lag(base: Configuration, name: str, small: Mapping[str, Any], lag: int) -> dict[str, Any]:
+    """The limits, with room for the earlier states that a constrained zonotope holds too."""
+    steps = lag or base.filters[name].lag
+    found = {**small, "max_generators": small["max_generators"] + base.base_model.state_count * steps}
+    return found | {"lag": steps} if steps else found
 
 
 def _of_kind(settings: FilterSettings, kind: str, small: Mapping[str, Any]) -> FilterSettings:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-from lsu_mesh.mesh.messages import Input, Measurement, Message, Posterior, Prediction, Reference, Truth
+from lsu_mesh.mesh.messages import Input, Measurement, Message, Posterior, Prediction, Reference, Smoothed, Truth
 
 Kind = TypeVar("Kind", bound=Message)
 
@@ -68,15 +68,15 @@ class Archive:
         """Whether a message is in the recording."""
         return reference in self._messages
 
-    def sets(self) -> list[Posterior | Prediction]:
+    def sets(self) -> list[Posterior | Prediction | Smoothed]:
         """All published sets, in the order of arrival, but each after the sets that it was made from.
 
         Messages of one process on several keys may overtake one another on their way to the recorder.
         """
-        ordered: dict[Reference, Posterior | Prediction] = {}
+        ordered: dict[Reference, Posterior | Prediction | Smoothed] = {}
         begun: set[Reference] = set()  # what is begun and not yet in order is being waited for: a circle is not closed
         for message in self._messages.values():
-            waiting = [message] if isinstance(message, Posterior | Prediction) else []
+            waiting = [message] if isinstance(message, Posterior | Prediction | Smoothed) else []
             while waiting:
                 one = waiting[-1]
                 begun.add(one.reference)
@@ -87,13 +87,14 @@ class Archive:
                     ordered.setdefault(one.reference, waiting.pop())
         return list(ordered.values())
 
-    def _made_from(self, message: Posterior | Prediction) -> list[Posterior | Prediction]:
+    def _made_from(self, message: Posterior | Prediction | Smoothed) -> Sequence[Posterior | Prediction]:
         """The sets that a set was made from, as far as they are here."""
         if isinstance(message, Prediction) and message.base is None:
             earlier = self._posteriors_before(message)
             return [max(earlier, key=lambda posterior: posterior.seq)] if earlier else []
         base = [message.base] if isinstance(message.base, tuple) else []
-        found = [self._messages.get(reference) for reference in (*base, *message.used)]
+        used = () if isinstance(message, Smoothed) else message.used
+        found = [self._messages.get(reference) for reference in (*base, *used)]
         return [other for other in found if isinstance(other, Posterior | Prediction)]
 
     def find(self, reference: Reference, kind: type[Kind]) -> Kind:

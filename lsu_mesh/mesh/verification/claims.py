@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Event, Fused, Guarantee, Message, Posterior, Prediction, Reference
+from lsu_mesh.mesh.messages import Event, Fused, Guarantee, Message, Posterior, Prediction, Reference, Smoothed
 from lsu_mesh.mesh.verification.archive import Archive
 from lsu_mesh.mesh.verification.findings import Difference
 from lsu_mesh.mesh.verification.lineage import Lineage, Set
@@ -31,9 +31,9 @@ class Claims:
         self.unproved: Counter[str] = Counter()
         """By claim and why."""
 
-    def proved_guarantee(self, message: Set) -> Guarantee | None:
+    def proved_guarantee(self, message: Set | Smoothed) -> Guarantee | None:
         """The guarantee that a set has by all that it descends from; ``None`` where that cannot be told."""
-        return self._lineage.proved(message)
+        return self._lineage.proved(message.base if isinstance(message, Smoothed) else message.reference)
 
     def check_lineage(self, message: Set, recomputed: Recomputed | None) -> None:
         """What one set descends from, after all that it was made from; and whether it is of the configuration."""

@@ -16,7 +16,17 @@ from typing import NamedTuple
 
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
-from lsu_mesh.mesh.messages import Fused, Guarantee, Input, Measurement, Message, Posterior, Prediction, Reference
+from lsu_mesh.mesh.messages import (
+    Fused,
+    Guarantee,
+    Input,
+    Measurement,
+    Message,
+    Posterior,
+    Prediction,
+    Reference,
+    Smoothed,
+)
 from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.mesh.verification.archive import Archive, Unverifiable
 
@@ -57,7 +67,7 @@ class Containment:
         """For the sets of a recording."""
         return cls(configuration, archive)
 
-    def check(self, message: Posterior | Prediction, proved: Guarantee | None) -> None:
+    def check(self, message: Posterior | Prediction | Smoothed, proved: Guarantee | None) -> None:
         """Check one set, after all that it was made from; ``proved``: its guarantee, recomputed from these."""
         truth = self.archive.truth.get(message.step)
         reason = self._reason(message, proved)
@@ -75,7 +85,7 @@ class Containment:
                 Miss(peer=message.src, topic=message.topic, step=message.step, seq=message.seq, state=outside)
             )
 
-    def _outside(self, message: Posterior | Prediction, x: list[float]) -> str:
+    def _outside(self, message: Posterior | Prediction | Smoothed, x: list[float]) -> str:
         """Words that say how the truth is outside of a set; "" where it is not."""
         assert self.configuration is not None
         states = self.configuration.base_model.states
@@ -86,7 +96,7 @@ class Containment:
             return f"x = {x!r} is proved to lie outside of the support"
         return ""
 
-    def _reason(self, message: Posterior | Prediction, proved: Guarantee | None) -> str:
+    def _reason(self, message: Posterior | Prediction | Smoothed, proved: Guarantee | None) -> str:
         """What a set rests on that was not true; "" where everything was. What it says of itself excuses nothing."""
         if proved not in (None, "declared"):
             return f"guarantee {proved!r}"
@@ -96,12 +106,14 @@ class Containment:
             except Unverifiable:
                 return NOT_THERE
         base = self._base_reason(message)
+        if isinstance(message, Smoothed):
+            return base
         used = [reason for reference in message.used if (reason := self._used_reason(reference))]
         if isinstance(message, Fused) and POLICIES[message.policy].takes_faults:
             used = used[message.faults :] if not _spans_steps(message, self.archive) else used
         return base or next(iter(used), "")
 
-    def _base_reason(self, message: Posterior | Prediction) -> str:
+    def _base_reason(self, message: Posterior | Prediction | Smoothed) -> str:
         assert self.configuration is not None
         truth = self.archive.truth
         if message.base == "prior":

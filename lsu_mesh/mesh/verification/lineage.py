@@ -50,9 +50,9 @@ class Lineage:
         self._claimed: defaultdict[tuple[str, str], set[Guarantee]] = defaultdict(set)
         self._marks: defaultdict[tuple[str, str], set[Mark]] = defaultdict(set)
 
-    def proved(self, message: Set) -> Guarantee | None:
+    def proved(self, reference: Reference) -> Guarantee | None:
         """The guarantee that a set has by all that it descends from; ``None`` where that is not in the recording."""
-        return self._proved.get(message.reference)
+        return self._proved.get(reference)
 
     def check(self, message: Set, recomputed: Recomputed | None) -> tuple[dict[str, object], list[str]]:
         """Claims that are false, with what they should be; and what cannot be proved, by name."""

@@ -26,12 +26,19 @@ from lsu_mesh.mesh.estimation.fusion_step import (
     fusion_engine,
     fusion_step,
 )
-from lsu_mesh.mesh.estimation.message_fields import density_of, described, described_fusion, finite_or_none, foretold
+from lsu_mesh.mesh.estimation.message_fields import (
+    density_of,
+    described,
+    described_fusion,
+    finite_or_none,
+    foretold,
+    smoothed,
+)
 from lsu_mesh.mesh.estimation.open_loop import MAX_LISTED, OpenLoop
 from lsu_mesh.mesh.estimation.step_data import DataOfSteps
 from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.transfer import Transfer
-from lsu_mesh.mesh.messages import Base, Bounds, Fused, Input, Posterior, Prediction, Reference, Suggestion
+from lsu_mesh.mesh.messages import Base, Bounds, Fused, Input, Posterior, Prediction, Reference, Smoothed, Suggestion
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.provenance_steps import Brought, provenance_steps
@@ -115,7 +122,21 @@ class Recomputation(ABC):
         fields = {**told, **bounds, "support": to_message(self._engine.support)}
         return Recomputed(_told(recorded, fields))
 
-    def other_algorithm(self, recorded: Posterior | Prediction) -> str | None:
+    def smoothed(self, recorded: Smoothed) -> Recomputed:
+        """What a smoothed set has by its posterior: the filter that held the one held the other too."""
+        base = self._archive.find(recorded.base, Posterior)
+        if (base.src, base.boot) != (recorded.src, recorded.boot):
+            raise DoesNotFit("base", f"{base.topic} {base.seq} of {base.src}", "a posterior of the same process")
+        if base.status == "inconsistent":
+            raise DoesNotFit("base", f"a set of status {base.status}", "one whose data were believed")
+        self._hold(base)
+        fields = smoothed(self._engine, base)
+        if not fields:
+            held = f"the lag is {self._engine.lag}, {self._engine.held_steps} steps are there"
+            raise DoesNotFit("lag", recorded.lag, f"no smoothed set: {held}")
+        return Recomputed({**fields, "step": base.step - self._engine.lag})
+
+    def other_algorithm(self, recorded: Posterior | Prediction | Smoothed) -> str | None:
         """The number of the arithmetic that computed a set, in words, where it is not today's: its bits may differ."""
         what, number = self.algorithm
         found = recorded.algorithm if recorded.algorithm is not None else 1
@@ -278,6 +299,10 @@ class FilterRecomputation(Recomputation):
         self._engine = self._in_force(recorded)
         return super().prediction(recorded)
 
+    def smoothed(self, recorded: Smoothed) -> Recomputed:
+        self._engine = self._in_force(recorded)
+        return super().smoothed(recorded)
+
     def _adopt(self, recorded: Posterior, message: Suggestion) -> None:
         if not is_due(message, recorded.step):
             raise DoesNotFit("used", f"bounds for step {message.adopt_at}", f"ones for step {recorded.step} or before")
@@ -286,7 +311,7 @@ class FilterRecomputation(Recomputation):
         if recorded.epoch not in engines:
             engines[recorded.epoch] = make_engine(self._settings, model, self._configuration.prior)
 
-    def _in_force(self, recorded: Posterior | Prediction) -> Filter:
+    def _in_force(self, recorded: Posterior | Prediction | Smoothed) -> Filter:
         """The filter with the bounds that the process went by at this epoch."""
         engines = self._adopted.get(recorded.boot, {})
         epochs = [epoch for epoch in engines if epoch <= recorded.epoch]

@@ -13,7 +13,7 @@ import msgspec
 from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.measurement_time import placed
-from lsu_mesh.mesh.messages import Fused, Measurement, Message, Prediction, Refused
+from lsu_mesh.mesh.messages import Fused, Measurement, Message, Prediction, Refused, Smoothed
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.claims import Claims
 from lsu_mesh.mesh.verification.containment import Containment
@@ -62,7 +62,8 @@ def verify(configuration: Configuration, messages: Iterable[Message]) -> Verific
         if recomputation is None:
             recomputation = recomputations[recorded.src] = _recomputation(configuration, archive, recorded)
         recomputed = _check(found, recomputation, recorded)
-        claims.check_lineage(recorded, recomputed)
+        if not isinstance(recorded, Smoothed):  # what one says of itself is its posterior's, and compared with that
+            claims.check_lineage(recorded, recomputed)
         found.containment.check(recorded, claims.proved_guarantee(recorded))
     claims.check_processes()
     found.false_claims, found.unproved = claims.false, claims.unproved
@@ -85,7 +86,7 @@ def _recomputation(configuration: Configuration, archive: Archive, recorded: Mes
     return FilterRecomputation(configuration, archive, recorded.name)
 
 
-def _check(found: Verification, recomputation: Recomputation, recorded: Set) -> Recomputed | None:
+def _check(found: Verification, recomputation: Recomputation, recorded: Set | Smoothed) -> Recomputed | None:
     """Compare one set; what it is by its provenance, or ``None`` where it cannot be recomputed.
 
     Equal is a proof, whatever number the arithmetic had. What differs by another arithmetic cannot be recomputed.
@@ -96,6 +97,8 @@ def _check(found: Verification, recomputation: Recomputation, recorded: Set) -> 
     try:
         if isinstance(recorded, Prediction):
             recomputed = recomputation.prediction(recorded)
+        elif isinstance(recorded, Smoothed):
+            recomputed = recomputation.smoothed(recorded)
         else:
             recomputed = recomputation.posterior(recorded)
         different = next(differences(recorded, recomputed.fields), None)

@@ -35,13 +35,17 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _contradiction(options: argparse.Namespace) -> str:
-    changes = [
-        flag
-        for flag, given in (("--with", options.other), ("--record", options.record), ("-X", options.overrides))
-        if given
-    ]
+    given = {
+        "--with": options.other,
+        "--smooth": options.smooth,
+        "--record": options.record,
+        "-X": options.overrides,
+    }
+    changes = [flag for flag, value in given.items() if value]
     if options.verify and changes:
         return f"--verify recomputes what was recorded; leave out {', '.join(changes)}"
+    if options.live and options.smooth:
+        return "--smooth recomputes in this process, --live runs peers; leave one of them out"
     return ""
 
 

@@ -31,6 +31,18 @@ def band_style(peer: str, color: Color) -> rr.Measurements:
     return rr.Measurements.from_fields(colors=[color] * 4, widths=[0.0, 1.0, 1.5, 1.0], names=names)
 
 
+def smoothed_style(peer: str, color: Color) -> rr.Measurements:
+    """Static style of the band of a peer's smoothed sets: it lies in the peer's own, darker and without a point."""
+    names = [f"{peer} smoothed {what}" for what in ("interval", "lower", "middle", "upper")]
+    return rr.Measurements.from_fields(colors=[darker(color)] * 4, widths=[0.0, 1.5, 0.0, 1.5], names=names)
+
+
+def darker(color: Color, share: float = 0.55) -> Color:
+    """The same colour with so much of its brightness."""
+    red, green, blue = (int(share * part) for part in color)
+    return red, green, blue
+
+
 def error_columns(lower: Array, point: Array, upper: Array) -> rr.ComponentColumnList:
     """Rows of a band of errors, with the line at zero where the truth is."""
     half = 0.5 * (upper - lower)

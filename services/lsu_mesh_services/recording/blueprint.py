@@ -149,7 +149,11 @@ def _bands(names: EntityPaths, state: int, peer: str | None = None) -> Part:
     seen = f"the truth (pink) and {whose}" if names.truth_is_known else whose
     title = f"{names.label(state)}: {seen}"
     crowded = [] if peer else [path("bands", part, name) for name in _outlined(names)]
-    return _plot(names, title, [shown, path("truth", part)], outlined=crowded)
+    contents = [shown, path("truth", part)]
+    if peer in names.smoothers:
+        contents.append(path("smoothed", part, peer))
+        title += f", dark those given {names.configuration.filters[peer].lag} more steps"
+    return _plot(names, title, contents, outlined=crowded)
 
 
 def _outlined(names: EntityPaths) -> list[str]:

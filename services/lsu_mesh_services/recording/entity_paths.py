@@ -5,6 +5,7 @@
 ``/raw/refused``                             payloads that are no message of this mesh
 ``/truth/<state>``                           true state
 ``/bands/<state>/<peer>``                    interval, with lower, point and upper, of a filter or a fusion
+``/smoothed/<state>/<peer>``                 the same of a filter with a lag, of the state given later data
 ``/errors/<state>/<peer>``                   point − truth, lower − truth, upper − truth
 ``/widths/<peer>``                           widths of the interval hull, one series per state
 ``/log_volume/<peer>``                       natural logarithm of the volume
@@ -36,7 +37,7 @@ import rerun as rr
 from lsu_mesh.mesh.access import truth_is_known
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.settings import SensorSettings
-from lsu_mesh.mesh.messages import Measurement, Message, Posterior, Prediction, Suggestion, Truth
+from lsu_mesh.mesh.messages import Measurement, Message, Posterior, Prediction, Smoothed, Suggestion, Truth
 
 
 @lru_cache(maxsize=4096)
@@ -105,6 +106,11 @@ class EntityPaths:
         return (*self.configuration.identifiers, *filters)
 
     @property
+    def smoothers(self) -> tuple[str, ...]:
+        """Filters with a lag, which publish smoothed sets too."""
+        return tuple(name for name, one in self.configuration.filters.items() if one.lag)
+
+    @property
     def truth_is_known(self) -> bool:
         """Whether a sensor is simulated; real measurements come without the truth."""
         return truth_is_known(self.configuration)
@@ -114,7 +120,7 @@ class EntityPaths:
         states = len(self.states)
         if isinstance(message, Truth):
             _check_count("states", len(message.x), states)
-        elif isinstance(message, Posterior):
+        elif isinstance(message, Posterior | Smoothed):
             _check_count("states", len(message.lower), states)
         elif isinstance(message, Measurement):
             _check_count("outputs", len(message.y), len(self.configuration.sensors[message.name].C))

@@ -9,8 +9,16 @@ import numpy as np
 import rerun as rr
 
 from lsu_mesh.array_types import Array
-from lsu_mesh.mesh.messages import Posterior, Truth
-from lsu_mesh_services.recording.bands import band_columns, band_style, error_columns, error_style, line_style
+from lsu_mesh.mesh.messages import Posterior, Smoothed, Truth
+from lsu_mesh_services.recording.bands import (
+    band_columns,
+    band_style,
+    darker,
+    error_columns,
+    error_style,
+    line_style,
+    smoothed_style,
+)
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import TRUTH, Color
 from lsu_mesh_services.recording.timeline import Moment, Timelines
@@ -51,6 +59,7 @@ class Estimates:
         self._truth_rows: list[tuple[Moment, list[float]]] = []
         self._rows: defaultdict[str, list[_Row]] = defaultdict(list)
         self._errors: defaultdict[str, list[_Error]] = defaultdict(list)
+        self._smoothed: defaultdict[str, list[tuple[Moment, Smoothed]]] = defaultdict(list)
         self._style(colors)
 
     def add_truth(self, message: Truth, arrival_ns: int) -> None:
@@ -85,17 +94,24 @@ class Estimates:
         else:
             waiting.append((message.name, row))
 
+    def add_smoothed(self, message: Smoothed, arrival_ns: int) -> None:
+        """A smoothed set, drawn at the step of its state."""
+        self._smoothed[message.name].append((Moment(message.step, arrival_ns), message))
+
     def flush(self) -> None:
         """Send all rows that wait."""
         rows, self._rows = self._rows, defaultdict(list)
         errors, self._errors = self._errors, defaultdict(list)
         truths, self._truth_rows = self._truth_rows, []
+        smoothed, self._smoothed = self._smoothed, defaultdict(list)
         if truths:
             self._send_truth(truths)
         for peer, of_peer in rows.items():
             self._send_rows(peer, of_peer)
         for peer, errors_of_peer in errors.items():
             self._send_errors(peer, errors_of_peer)
+        for peer, smoothed_of_peer in smoothed.items():
+            self._send_smoothed(peer, smoothed_of_peer)
 
     def _send_truth(self, rows: list[tuple[Moment, list[float]]]) -> None:
         times = self._timelines.columns([moment for moment, _ in rows])
@@ -115,6 +131,14 @@ class Estimates:
         self._stream.send_columns(path("latency", peer), times, rr.Scalars.columns(scalars=latencies))
         self._send_known("log_volume", peer, [(row.moment, row.log_volume) for row in rows])
         self._send_known("gain", peer, [(row.moment, row.gain) for row in rows])
+
+    def _send_smoothed(self, peer: str, rows: list[tuple[Moment, Smoothed]]) -> None:
+        times = self._timelines.columns([moment for moment, _ in rows])
+        lower, upper = np.array([one.lower for _, one in rows]), np.array([one.upper for _, one in rows])
+        middle = lower + 0.5 * (upper - lower)
+        for i, state in enumerate(self._names.states):
+            columns = band_columns(lower[:, i], middle[:, i], upper[:, i])
+            self._stream.send_columns(path("smoothed", state, peer), times, columns)
 
     def _send_known(self, what: str, peer: str, rows: list[tuple[Moment, float | None]]) -> None:
         known = [(moment, value) for moment, value in rows if value is not None]
@@ -136,6 +160,8 @@ class Estimates:
             for peer, color in colors.items():
                 self._stream.log(path("bands", state, peer), band_style(peer, color), static=True)
                 self._stream.log(path("errors", state, peer), error_style(peer, color), static=True)
+            for peer in self._names.smoothers:
+                self._stream.log(path("smoothed", state, peer), smoothed_style(peer, colors[peer]), static=True)
         labels = [self._names.label(i) for i in range(len(self._names.states))]
         for peer, color in colors.items():
             shades = [_shade(color, i, len(labels)) for i in range(len(labels))]
@@ -160,6 +186,4 @@ def _remember(memory: dict[int, Kept], step: int, value: Kept) -> None:
 
 def _shade(color: Color, i: int, count: int) -> Color:
     """Shades of one colour for several series of one peer: from the colour itself towards its dark."""
-    share = 1.0 - 0.55 * (i / max(count - 1, 1))
-    red, green, blue = (int(part * share) for part in color)
-    return red, green, blue
+    return darker(color, 1.0 - 0.55 * (i / max(count - 1, 1)))

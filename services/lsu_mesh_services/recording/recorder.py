@@ -12,7 +12,17 @@ from typing import NamedTuple
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.ledger import Ledger
-from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Prediction, Suggestion, Truth
+from lsu_mesh.mesh.messages import (
+    Event,
+    Health,
+    Measurement,
+    Message,
+    Posterior,
+    Prediction,
+    Smoothed,
+    Suggestion,
+    Truth,
+)
 from lsu_mesh_services.recording import palette
 from lsu_mesh_services.recording.entity_paths import EntityPaths
 from lsu_mesh_services.recording.estimates import Estimates
@@ -243,6 +253,8 @@ class Recorder:
             self._space.add(message, arrival_ns)
             self._half_widths.add(message, arrival_ns)
             self._status.add(message, arrival_ns)
+        elif isinstance(message, Smoothed):
+            self._estimates.add_smoothed(message, arrival_ns)
         elif isinstance(message, Suggestion):
             self._half_widths.add_suggestion(message, arrival_ns)
         elif isinstance(message, Truth):

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load, load_values
 from lsu_mesh.mesh.keys import key
-from lsu_mesh.mesh.messages import encode
+from lsu_mesh.mesh.messages import Truth, encode
 from lsu_mesh.mesh.replay import SOURCES, Replay, Timed
 from lsu_mesh_services.configuration import print_problems
 from lsu_mesh_services.exit_codes import COULD_NOT_START, NOT_MET, OK, USAGE
@@ -23,6 +23,7 @@ from lsu_mesh_services.monitoring.run_report import Row, RunReport
 from lsu_mesh_services.monitoring.table import share
 from lsu_mesh_services.recording.read import Received, Recording
 from lsu_mesh_services.replay.compare import CannotReplay, beside
+from lsu_mesh_services.replay.smooth import SmoothedRow, json_lines, print_rows, smoothed_rows, with_lag
 
 
 def replay_again(recording: Recording, options: argparse.Namespace) -> int:
@@ -50,7 +51,7 @@ def replay_again(recording: Recording, options: argparse.Namespace) -> int:
 
 def is_comparison(options: argparse.Namespace) -> bool:
     """Whether other filters run on the recorded data."""
-    return options.other is not None or bool(model_changes(options))
+    return options.other is not None or options.smooth is not None or bool(model_changes(options))
 
 
 def model_changes(options: argparse.Namespace) -> list[str]:
@@ -70,6 +71,8 @@ def configurations(recording: Recording, options: argparse.Namespace) -> tuple[C
         other = load_values(old.values, old.path, model_changes(options), reads_files=False)
     else:
         other = load(Path(options.other), model_changes(options), os.environ, reads_files=False)
+    if options.smooth is not None:
+        other = with_lag(other, options.smooth)
     return beside(old, other)
 
 
@@ -94,7 +97,8 @@ def _target(recording: Recording, options: argparse.Namespace) -> Path | None:
     if not is_comparison(options):
         return None
     file = recording.files[0]
-    words = "changed" if options.other is None else Path(options.other).stem
+    changed = "smoothing" if options.smooth is not None else "changed"
+    words = changed if options.other is None else Path(options.other).stem
     target, number = file.with_name(f"{file.stem}-with-{words}{file.suffix}"), 1
     while target.exists():
         number += 1
@@ -142,18 +146,28 @@ def _print(
     for now, message in sorted([*sources, *made], key=lambda timed: timed[0]):
         new.record(message, now)
     rows = [("recorded", row) for row in old.rows()] + [("replayed", row) for row in new.rows()]
+    smoothed = [] if options.smooth is None else _smoothed(recording, made)
     run = max((row.last_step for _, row in rows), default=0) / recording.configuration.mesh.rate
     speed = run / seconds if seconds else 0.0
     if options.json:
         for what, row in rows:
             print(json.dumps({"type": "estimator", "run": what, **asdict(row)}))
+        for line in json_lines(smoothed):
+            print(line)
         recorded = None if target is None else str(target)
         print(json.dumps({"type": "replay", "seconds": seconds, "times_real_time": speed, "recording": recorded}))
         return
     _print_table(rows)
+    if options.smooth is not None:
+        print_rows(smoothed, options.smooth)
     print(f"{run:.4g} s of the run in {seconds:.3g} s: {speed:.3g} × real time")
     if target is not None:
         print(f"recorded in {target}")
+
+
+def _smoothed(recording: Recording, made: Sequence[Timed]) -> list[SmoothedRow]:
+    truth = {one.message.step: one.message.x for one in recording.received if isinstance(one.message, Truth)}
+    return smoothed_rows([message for _, message in made], truth)
 
 
 def _print_table(rows: Sequence[tuple[str, Row]]) -> None:

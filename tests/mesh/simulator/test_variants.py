@@ -7,10 +7,22 @@ from pathlib import Path
 
 import pytest
 
+from lsu_mesh.filters.lsucz import LSUCZ
+from lsu_mesh.mesh.simulator.faults import FAULTS
 from lsu_mesh.mesh.simulator.run import run_seed
-from lsu_mesh.mesh.simulator.variants import IN_ITS_PLACE, Variant, configured, draw_variant
+from lsu_mesh.mesh.simulator.time_variants import draw_times
+from lsu_mesh.mesh.simulator.variants import (
+    IN_ITS_PLACE,
+    MAX_CONSTRAINTS,
+    MAX_GENERATORS,
+    Variant,
+    configured,
+    draw_lag,
+    draw_variant,
+)
 
 SEEDS = range(40)
+STEPS = 60
 
 
 def with_kind(demo: Path, folder: Path, kind: str, *options: str) -> Path:
@@ -51,3 +63,37 @@ def test_a_mesh_with_such_a_filter_keeps_the_invariants(demo: Path, tmp_path: Pa
     assert f"para={kind}" in outcome.variant
     assert outcome.broken == ""
     assert outcome.sets > 100
+
+
+def smoothing_seeds(demo: Path) -> list[int]:
+    """Seeds whose constrained zonotope has a lag."""
+    base = configured(demo, STEPS, 0, Variant())
+    found = []
+    for seed in range(1, 200):
+        variant = draw_variant(random.Random(seed), base)
+        times = draw_times(random.Random(f"{seed}/times"), base) if variant.kinds else "as it is"
+        if ("cz", "LSUCZ") in variant.kinds and draw_lag(random.Random(f"{seed}/lag"), times):
+            found.append(seed)
+    return found
+
+
+def test_a_filter_with_a_lag_keeps_the_invariants(demo: Path) -> None:
+    for seed in smoothing_seeds(demo)[:2]:
+        outcome = run_seed(demo, seed, STEPS, FAULTS)
+        assert "lag=2" in outcome.variant
+        assert outcome.broken == ""
+
+
+def test_the_set_of_another_step_is_found(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bounds = LSUCZ.smoothed_bounds
+    monkeypatch.setattr(LSUCZ, "smoothed_bounds", lambda self, steps: bounds(self, 0))
+    outcomes = [run_seed(demo, seed, STEPS, ()) for seed in smoothing_seeds(demo)[:3]]
+    assert any(one.broken.startswith("containment") for one in outcomes)
+
+
+def test_a_lag_of_the_configuration_leaves_room_for_the_earlier_states(demo: Path, tmp_path: Path) -> None:
+    file = tmp_path / "mesh.toml"
+    file.write_text(demo.read_text().replace("max_generators = 20", "max_generators = 32\nlag = 3", 1))
+    found = configured(file, STEPS, 0, Variant((("cz", "LSUCZ"),))).filters["cz"]
+    assert found.options["max_generators"] == MAX_GENERATORS + 3 * 3
+    assert (found.options["lag"], found.options["max_constraints"]) == (3, MAX_CONSTRAINTS)

@@ -9,12 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn import drawn, messages, values_of
+from local_mesh import LocalMesh
+from lsu_mesh_services.recording.blueprint import _bands
+from lsu_mesh_services.recording.entity_paths import EntityPaths
+from lsu_mesh_services.recording.entity_paths import path as entity_path
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.synthetic_mesh import Arrival, SyntheticMesh, written
+from recorded_mesh import record as recorded
 from rerun.chunk import RrdReader
 
 from lsu_mesh.mesh.config import Configuration, load
-from lsu_mesh.mesh.messages import Fused, Measurement, Posterior, Prediction, Truth
+from lsu_mesh.mesh.messages import Fused, Measurement, Posterior, Prediction, Smoothed, Truth
 
 Record = Callable[[Configuration, Sequence[Arrival]], Path]
 
@@ -47,6 +52,31 @@ def test_truth_bands_and_errors_are_the_numbers_of_the_messages(
         assert (widths == np.array([np.subtract(m.upper, m.lower) for m in said])).all()
         volumes = drawn(path, f"/log_volume/{name}", "Scalars:scalars")
         assert volumes == [(m.step, [m.log_volume]) for m in said if m.log_volume is not None]
+
+
+def test_smoothed_bands_are_drawn_at_the_step_of_their_state(demo: Path, tmp_path: Path) -> None:
+    mesh = LocalMesh(load(demo, ["mesh.steps=30", "filters.cz.lag=4"]))
+    mesh.run(1.0)
+    path = recorded(mesh, tmp_path / "smoothed.rrd")
+    said = mesh.of(Smoothed, "cz")
+    assert len(said) == 26
+    for i, state in enumerate(mesh.configuration.base_model.states):
+        rows = drawn(path, f"/smoothed/{state}/cz", "Measurements:values")
+        assert [step for step, _ in rows] == [m.step for m in said]
+        band = np.array([values for _, values in rows])
+        assert (band[:, 1] == [m.lower[i] for m in said]).all()
+        assert (band[:, 3] == [m.upper[i] for m in said]).all()
+        assert not drawn(path, f"/smoothed/{state}/box", "Measurements:values")
+
+
+def test_the_plots_of_a_filter_with_a_lag_show_its_smoothed_bands(demo: Path) -> None:
+    names = EntityPaths(load(demo, ["filters.cz.lag=4"]))
+    state = names.states[0]
+    own, other = _bands(names, 0, "cz"), _bands(names, 0, "box")
+    assert entity_path("smoothed", state, "cz") in own.contents
+    assert str(own.name).endswith("dark those given 4 more steps")
+    assert not any("smoothed" in entity for entity in other.contents)
+    assert names.smoothers == ("cz",)
 
 
 def test_errors_wait_for_a_truth_that_comes_late(configuration: Configuration, record: Record) -> None:
