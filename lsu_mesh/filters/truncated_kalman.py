@@ -125,7 +125,7 @@ def truncated(held: Gaussian, lower: Vector, upper: Vector) -> Gaussian:
     """
     mean, P = np.array(held.mean), np.array(held.covariance)
     for i in range(mean.size):
-        s = np.sqrt(P[i, i])
+        s = np.sqrt(max(P[i, i], 0.0))
         if not s > 0.0:
             mean[i] = min(max(mean[i], lower[i]), upper[i])
             continue

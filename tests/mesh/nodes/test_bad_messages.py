@@ -271,6 +271,8 @@ def test_a_set_of_monstrous_complexity_is_refused() -> None:
     fields = fields_of("posterior") | {"model": configuration.digest(), "lower": [0.0] * 3, "upper": [1.0] * 3}
     fields |= {
         "point": [0.0] * 3,
+        "mean": None,
+        "covariance": None,
         "support": {"type": "zonotope", "center": [0.0] * 3, "generators": [[0.1] * 4000] * 3},
     }
     node = FusionNode(configuration, "main", "f" * 16)
@@ -289,7 +291,15 @@ def test_a_set_that_is_empty_kills_nobody(role: str) -> None:
         "b": [9.0],
     }
     fields = fields_of("posterior") | {"model": configuration.digest(), "lower": [-1.0] * 3, "upper": [1.0] * 3}
-    fields |= {"point": [0.0] * 3, "support": nothing, "step": 9, "src": "filter/cz", "status": "ok"}
+    fields |= {
+        "point": [0.0] * 3,
+        "mean": None,
+        "covariance": None,
+        "support": nothing,
+        "step": 9,
+        "src": "filter/cz",
+        "status": "ok",
+    }
     drive = fields_of("input") | {
         "model": configuration.digest(),
         "u": [0.0],
