@@ -101,7 +101,12 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         (REST,),
         ("filter", "fusion"),
     ],
-    "lsu_mesh.mesh.verification": [("archive",), ("provenance_steps", "containment"), (REST,), ("verify",)],
+    "lsu_mesh.mesh.verification": [
+        ("archive",),
+        ("provenance_steps", "containment", "recomputed"),
+        (REST,),
+        ("verify",),
+    ],
     "lsu_mesh.mesh.simulator": [
         ("broken", "faults", "decoding", "recorder"),
         (REST,),

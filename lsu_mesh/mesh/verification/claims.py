@@ -15,7 +15,7 @@ from lsu_mesh.mesh.verification.findings import Difference
 from lsu_mesh.mesh.verification.lineage import Lineage, Set
 from lsu_mesh.mesh.verification.presence import Presence, by_process
 from lsu_mesh.mesh.verification.process_claims import ProcessClaims
-from lsu_mesh.mesh.verification.recompute import Recomputed
+from lsu_mesh.mesh.verification.recomputed import Recomputed
 
 
 class Claims:

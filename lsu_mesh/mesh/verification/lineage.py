@@ -18,7 +18,7 @@ from lsu_mesh.mesh.estimation.guarantee import declared_guarantee
 from lsu_mesh.mesh.estimation.held_set import weakest
 from lsu_mesh.mesh.messages import Fused, Guarantee, Mark, Message, Posterior, Prediction, Reference, Suggestion
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
-from lsu_mesh.mesh.verification.recompute import Recomputed
+from lsu_mesh.mesh.verification.recomputed import Recomputed
 
 Set = Posterior | Prediction
 NOT_THERE = "what it was made from is not in the recording"

@@ -17,7 +17,7 @@ from lsu_mesh.mesh.estimation.quarantine import Quarantine
 from lsu_mesh.mesh.messages import Fused, Measurement, Message, Posterior, Prediction
 from lsu_mesh.mesh.verification.archive import Archive
 from lsu_mesh.mesh.verification.process_claims import FalseClaim
-from lsu_mesh.mesh.verification.recompute import Recomputed
+from lsu_mesh.mesh.verification.recomputed import Recomputed
 
 
 class Presence:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from lsu_mesh.mesh.estimation.fusion_step import OUTVOTED
 from lsu_mesh.mesh.messages import Event, Fused, Measurement, Posterior, Prediction, Reference
 from lsu_mesh.mesh.verification.process_events import ProcessEvents
-from lsu_mesh.mesh.verification.recompute import Recomputed
+from lsu_mesh.mesh.verification.recomputed import Recomputed
 
 Set = Posterior | Prediction
 EARLIER_LIFE = "epoch: of a process's first set, which continues an earlier process that is not in the recording"

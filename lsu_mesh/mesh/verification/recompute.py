@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -42,30 +42,10 @@ from lsu_mesh.mesh.messages import Base, Bounds, Fused, Input, Posterior, Predic
 from lsu_mesh.mesh.sets import to_message, to_support
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
 from lsu_mesh.mesh.verification.provenance_steps import Brought, provenance_steps
+from lsu_mesh.mesh.verification.recomputed import Recomputed, told_by
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
 
-Fields = Mapping[str, Any]
-"""Fields of a message and their values."""
-DataStatus = Literal["ok", "predicted", "inconsistent"]
-
-
-@dataclass(frozen=True)
-class Recomputed:
-    """A set again: the ``fields`` of its message that hold numbers, and what its claims rest on.
-
-    ``status`` is that of its step's data alone; ``is_widened``: whether r was widened since its base; ``outvoted``:
-    sources that contradict those that were used, ``None`` where that cannot be told.
-    """
-
-    fields: Fields
-    status: DataStatus = "ok"
-    is_widened: bool = False
-    outvoted: frozenset[str] | None = field(default_factory=frozenset)
-
-
-OF_POINTS = ("point", "y_point", "point_rule", "mean", "covariance")
-"""Fields that rest on the rule of the points."""
 MAX_KEPT = 8192
 """So many states are remembered of a filter whose messages do not tell all that it holds."""
 
@@ -107,7 +87,7 @@ class Recomputation(ABC):
         if not self._engine.is_resumable:
             self._keep(recorded.reference)
         fields = {**found.fields, "support": to_message(self._engine.support)}
-        return replace(found, fields=_told(recorded, fields), is_widened=is_widened)
+        return replace(found, fields=told_by(recorded, fields), is_widened=is_widened)
 
     def prediction(self, recorded: Prediction) -> Recomputed:
         """What a prediction has by its base and the input of the step before."""
@@ -120,7 +100,7 @@ class Recomputation(ABC):
         bounds = {} if recorded.bounds is None else {"bounds": self._noise_bounds()}
         told = foretold(self._engine, self._configuration.input_box)
         fields = {**told, **bounds, "support": to_message(self._engine.support)}
-        return Recomputed(_told(recorded, fields))
+        return Recomputed(told_by(recorded, fields))
 
     def smoothed(self, recorded: Smoothed) -> Recomputed:
         """What a smoothed set has by its posterior: the filter that held the one held the other too."""
@@ -261,13 +241,6 @@ class Recomputation(ABC):
     def _noise_bounds(self, factor: float = 1.0) -> Bounds:
         rho, r = self._engine.half_widths
         return Bounds(rho=rho.tolist(), r=(r * factor).tolist())
-
-
-def _told(recorded: Posterior | Prediction, fields: Fields) -> Fields:
-    """The fields without those of points where a message, of an older peer, does not say how its point was chosen."""
-    if recorded.point_rule is not None:
-        return fields
-    return {name: value for name, value in fields.items() if name not in OF_POINTS}
 
 
 def _since(message: Input | None) -> int | None:

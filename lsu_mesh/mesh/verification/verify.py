@@ -23,8 +23,8 @@ from lsu_mesh.mesh.verification.recompute import (
     FilterRecomputation,
     FusionRecomputation,
     Recomputation,
-    Recomputed,
 )
+from lsu_mesh.mesh.verification.recomputed import Recomputed
 
 
 @dataclass
