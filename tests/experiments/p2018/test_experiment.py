@@ -128,7 +128,7 @@ def test_errors_grow_with_both_noises() -> None:
 def test_figure_1_shows_the_steps_of_a_filter_that_goes_one_by_one() -> None:
     found = states(1)
     model, data = data_of(1, LAST)
-    filter = LSUO(model, prior(model), meet=False)
+    filter = LSUO(model, prior(model), meet=False, point="centre")
     for k in range(LAST):
         filter.update(data.Y[k])
         if k + 1 >= FIRST:
