@@ -320,12 +320,8 @@ def test_a_set_that_is_empty_kills_nobody(role: str) -> None:
 
 def measurement(configuration: Configuration, step: int, seq: int) -> bytes:
     fields = fields_of("measurement") | {
-        "src": "sensor/s1",
-        "step": step,
-        "seq": seq,
-        "y": [0.0],
-        "time_error_ns": None,
-    }
+        "src": "sensor/s1", "step": step, "seq": seq, "y": [0.0], "time_error_ns": None,
+    }  # fmt: skip
     return msgpack.packb(fields | {"model": configuration.digest()})
 
 
