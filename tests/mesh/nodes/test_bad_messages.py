@@ -319,10 +319,8 @@ def test_a_set_that_is_empty_kills_nobody(role: str) -> None:
 
 
 def measurement(configuration: Configuration, step: int, seq: int) -> bytes:
-    fields = fields_of("measurement") | {
-        "src": "sensor/s1", "step": step, "seq": seq, "y": [0.0], "time_error_ns": None,
-    }  # fmt: skip
-    return msgpack.packb(fields | {"model": configuration.digest()})
+    own = {"src": "sensor/s1", "step": step, "seq": seq, "y": [0.0], "time_error_ns": None}
+    return msgpack.packb(fields_of("measurement") | own | {"model": configuration.digest()})
 
 
 def test_a_step_behind_the_end_of_the_mesh_is_refused() -> None:
