@@ -41,6 +41,7 @@ TAKEN: dict[str, set[str]] = {
     "filters.*.history": WHOLE, "filters.*.transfer_from": {"empty list"}, "filters.*.reset_after": WHOLE,
     "filters.*.transfer.publish_when": {*POSITIVE, "zero"},
     "filters.*.box": FLAG, "filters.*.scaled": FLAG, "filters.*.reduce": FLAG,
+    "filters.*.lag": {"whole", "zero"},
     "filters.*.meet": FLAG, "filters.*.max_generators": WHOLE, "filters.*.max_constraints": {"whole", "zero"},
     "filters.*.order": WHOLE, "filters.*.window": WHOLE, "filters.*.unknown": {"empty list"},
     "filters.*.rho_range": {"list"}, "filters.*.r_range": {"list"},
