@@ -24,7 +24,7 @@ def result(system: str, kind: str, way: str, ratio: float) -> transfer.Result:
 
 
 PAIRS = [
-    (system, kind) for system, kinds in transfer.SYSTEMS.items() for kind in kinds if kind not in transfer.GAINS_LITTLE
+    (system, kind) for system, kinds in transfer.SYSTEMS.items() for kind in kinds if kind not in transfer.BY_VOLUME
 ]
 
 

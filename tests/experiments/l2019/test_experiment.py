@@ -41,7 +41,9 @@ def test_the_criteria_are_those_of_single_filters_step_by_step() -> None:
     data = simulate_all(models, JOB.draws(), START)
     row, run = 1, 1
     i = row * JOB.runs + run
-    box, body = LSUO(models[row], prior(models[row]), meet=False), LSUP(models[row], prior(models[row]), box=False)
+    start = prior(models[row])
+    box = LSUO(models[row], start, meet=False, point="centre")
+    body = LSUP(models[row], start, box=False, point="centre")
     volumes, nested, smaller, shares, errors = [], [], [], [], [[], []]
     for k in range(JOB.steps):
         intervals = [single.predict_output() for single in (box, body)]
@@ -150,7 +152,7 @@ def test_of_the_measured_position_alone_both_sentences_on_s2_hold() -> None:
 def test_the_measured_error_is_that_of_the_position() -> None:
     job = Job("S2", 0.1, (0.1,), 1, 40, 1)
     found, data = criteria(job), simulate_all(job.models(), job.draws(), START)
-    single, errors = LSUO(job.models()[0], prior(job.models()[0]), meet=False), []
+    single, errors = LSUO(job.models()[0], prior(job.models()[0]), meet=False, point="centre"), []
     for k in range(40):
         single.update(data.Y[0, k])
         errors.append(single.point[0] - data.X[0, k, 0])

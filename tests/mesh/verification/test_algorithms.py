@@ -10,6 +10,7 @@ import pytest
 from msgspec import structs
 
 from lsu_mesh.filters.lsucz import LSUCZ
+from lsu_mesh.filters.lsuo import LSUO
 from lsu_mesh.mesh.messages import Message, Posterior, decode, encode
 from lsu_mesh.mesh.verification import verify
 
@@ -69,8 +70,11 @@ def test_claims_of_sets_of_an_older_number_are_proved(
         assert ("filter/cz", 12, claim) in {(one.peer, one.step, one.field) for one in found.false_claims}
 
 
-def test_no_number_is_the_first(messages: tuple[Any, list[Message]]) -> None:
-    mesh, recorded = messages
+def test_no_number_is_the_first(module_mesh: MakeMesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(LSUO, "algorithm", 1)
+    mesh = module_mesh("mesh.steps=10")
+    mesh.run(0.4)
+    recorded = [decode(message.topic, encode(message)) for _, message in mesh.sent]
     names = {m.name for m in recorded if isinstance(m, Posterior) and m.algorithm == 1}
     assert names
     first = [structs.replace(m, algorithm=None) if getattr(m, "algorithm", 0) == 1 else m for m in recorded]
