@@ -163,7 +163,7 @@ def widths_at_reports(configuration: Configuration, made: type[LSUCZ] | type[LSU
 
 @pytest.mark.parametrize(
     ("half_ms", "left_out", "altitude", "climb_rate"),
-    [(500, 4, 82, 72), (700, 1, 117, 87), (800, 0, 137, 94), (1000, 0, 183, 108)],
+    [(500, 4, 82, 72), (700, 1, 116, 85), (800, 0, 136, 92), (1000, 0, 182, 107)],
 )
 def test_the_widths_are_those_of_the_page(
     aircraft_carrier: Configuration, half_ms: int, left_out: int, altitude: int, climb_rate: int
