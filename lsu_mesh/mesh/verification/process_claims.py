@@ -11,6 +11,7 @@ from lsu_mesh.mesh.verification.process_events import ProcessEvents
 from lsu_mesh.mesh.verification.recomputed import Recomputed
 
 Set = Posterior | Prediction
+MISSED_BASE = "epoch: of a prediction whose posterior the recorder missed"
 EARLIER_LIFE = "epoch: of a process's first set, which continues an earlier process that is not in the recording"
 GAP = "status: whether it is the first set since a start, because the recorder missed the one before"
 OTHER_NUMBER = "status: whether the data contradict a set of another algorithm"
@@ -142,5 +143,7 @@ class ProcessClaims:
         base = self._by_reference.get(message.base) if isinstance(message.base, tuple) else None
         if base is not None and message.epoch != base.epoch:
             yield FalseClaim(message, "epoch", base.epoch)
+        elif base is None and isinstance(message.base, tuple) and message.base[1:3] == (message.src, message.boot):
+            self.unproved.append(MISSED_BASE)
         elif base is None and message.base is not None and message.epoch not in self._events.told(message):
             yield FalseClaim(message, "epoch", "one that an event told of")

@@ -124,6 +124,14 @@ def test_the_first_epoch(plain: Any) -> None:
     assert_found(*altered(plain, "box", lambda m: {"epoch": 1}, a_set(Posterior, 1)), "epoch")
 
 
+def test_a_prediction_whose_posterior_the_recorder_missed_is_not_accused(plain: Any) -> None:
+    messages = [m for m in recorded(plain) if not (isinstance(m, Posterior) and (m.name, m.step) == ("box", STEP))]
+    found = verify(plain.configuration, messages)
+    assert found.false_claims == []
+    assert found.unproved["epoch: of a prediction whose posterior the recorder missed"] == 1
+    assert found.holds
+
+
 def test_a_sensor_that_was_there_and_one_that_was_not(plain: Any) -> None:
     for missing in (["s1"], ["s9"], ["s2", "s1"]):
         changed = altered(plain, "para", lambda m, names=missing: {"missing": names}, a_set(Posterior))
