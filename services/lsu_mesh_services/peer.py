@@ -137,7 +137,7 @@ class Peer:
         links = self._bus.links()
         if links != self._links:
             self._links = links
-            self._node.record_links(links)
+            self._node.record_links(links, now)
 
     def farewell(self) -> None:
         """A last health message, so that the counts of the whole run are known."""

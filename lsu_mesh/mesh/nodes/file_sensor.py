@@ -44,6 +44,10 @@ class FileSensorNode(Node):
     def receive(self, message: Message, now: int) -> list[Message]:
         return []
 
+    def record_links(self, count: int, now: int) -> None:
+        super().record_links(count, now)
+        self._pace.record_links(count, now)
+
     def advance(self, now: int) -> list[Message]:
         messages: list[Message] = [] if self._has_told else [self._told_left_out(now)]
         due = min(self._schedule.due(now), self._last)

@@ -114,7 +114,7 @@ class Node(ABC):
         """Do once, and forget, what a step does, so that the first real step finds all kernels loaded."""
         return
 
-    def record_links(self, count: int) -> None:
+    def record_links(self, count: int, now: int) -> None:
         """How many peers and routers the process is connected to; the next tick tells."""
         self.gauges["links"] = float(count)
         self.next_health = 0

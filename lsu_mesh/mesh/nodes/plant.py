@@ -57,6 +57,10 @@ class PlantNode(Node):
     def receive(self, message: Message, now: int) -> list[Message]:
         return []
 
+    def record_links(self, count: int, now: int) -> None:
+        super().record_links(count, now)
+        self._pace.record_links(count, now)
+
     def advance(self, now: int) -> list[Message]:
         due = self._schedule.due(now)
         if self._last is not None:

@@ -12,7 +12,7 @@ from lsu_mesh.mesh.messages import Measurement, Truth
 from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.plant import PlantNode
-from lsu_mesh.mesh.nodes.rate_limit import HURRY, SETTLING_NS, RateLimit
+from lsu_mesh.mesh.nodes.rate_limit import HURRY, MOST_SETTLING_NS, SETTLING_NS, RateLimit
 from lsu_mesh.mesh.nodes.schedule import Schedule
 
 RATE, KEPT = 50.0, 300
@@ -20,11 +20,19 @@ BACK_S = 1.5
 """Links are back after so long, at the latest."""
 
 
-def published(pace: RateLimit, late: int, seconds: float) -> list[tuple[int, int]]:
-    """Times and steps of a source that is so many steps late at time 0, and is told when to go on."""
+def published(
+    pace: RateLimit, late: int, seconds: float, links: dict[float, int] | None = None
+) -> list[tuple[int, int]]:
+    """Times and steps of a source that is so many steps late at time 0, and is told when to go on.
+
+    ``links``: how many connections there are from a second on.
+    """
     now, behind, out = 10 * SECOND, float(late), []
     begin, end = now, now + int(seconds * SECOND)
+    changes = sorted((begin + int(at * SECOND), count) for at, count in (links or {}).items())
     while now < end:
+        while changes and changes[0][0] <= now:
+            pace.record_links(changes.pop(0)[1], now)
         steps = pace.take(int(behind), now)
         behind -= steps
         out += [(now - begin, steps)] if steps else []
@@ -46,6 +54,26 @@ def test_a_source_in_time_never_waits() -> None:
 def test_what_goes_out_before_links_are_back_is_kept(late: int) -> None:
     out = published(RateLimit(RATE, KEPT), late, BACK_S)
     assert KEPT // 3 <= sum(steps for _, steps in out) <= KEPT
+
+
+@pytest.mark.parametrize("back", [0.5, 1.5, 2.4])
+def test_it_does_not_hurry_before_links_are_back_for_a_moment(back: float) -> None:
+    """The first that was sent without links must be kept until those who missed it have asked: it takes a second."""
+    pace = RateLimit(RATE, KEPT)
+    pace.record_links(5, 0)
+    pace.take(1, 0)
+    out = published(pace, 500, 20.0, links={0.1: 4, back: 5})
+    assert sum(steps for at, steps in out if at <= (back + 0.9) * SECOND) <= KEPT
+    assert sum(steps for _, steps in out) >= 500 + 19.0 * RATE, "it gets there"
+
+
+def test_a_peer_that_has_left_does_not_hold_a_source_up() -> None:
+    pace = RateLimit(RATE, KEPT)
+    pace.record_links(5, 0)
+    pace.take(1, 0)
+    out = published(pace, 500, 20.0, links={0.1: 4})
+    assert sum(steps for at, steps in out if at <= MOST_SETTLING_NS) <= KEPT
+    assert sum(steps for _, steps in out) >= 500 + 19.0 * RATE
 
 
 def test_a_source_that_is_late_by_less_than_it_may_send_at_once_is_in_time_at_once() -> None:
