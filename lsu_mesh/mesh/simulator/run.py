@@ -57,7 +57,7 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
     variant = draw_variant(rng, base)
     if variant.kinds:
         times = draw_times(random.Random(f"{seed}/times"), base)
-        variant = variant._replace(times=times, lag=draw_lag(random.Random(f"{seed}/lag"), times))
+        variant = variant._replace(times=times, lag=draw_lag(random.Random(f"{seed}/lag"), base, times))
         if variant.transfer[1] == "predictor":
             variant = variant._replace(publish_when=random.Random(f"{seed}/worth").choice(WORTH))
     trajectory = rng.randrange(TRAJECTORIES)

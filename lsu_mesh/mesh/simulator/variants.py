@@ -73,9 +73,9 @@ def draw_variant(rng: random.Random, base: Configuration) -> Variant:
     return Variant(kinds, transfer, rng.choice(("", "", "", "domain", "input_box")))
 
 
-def draw_lag(rng: random.Random, times: str) -> int:
-    """The lag of the constrained zonotopes of one run."""
-    return rng.choice(LAGS) if times in GRID_TIMES else 0
+def draw_lag(rng: random.Random, base: Configuration, times: str) -> int:
+    """The lag of the constrained zonotopes of one run; continuous models refuse one."""
+    return rng.choice(LAGS) if times in GRID_TIMES and base.continuous is None else 0
 
 
 def _draw_kind(rng: random.Random, kind: str) -> str:

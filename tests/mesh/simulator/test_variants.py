@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lsu_mesh.filters.lsucz import LSUCZ
+from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.simulator.faults import FAULTS
 from lsu_mesh.mesh.simulator.run import run_seed
 from lsu_mesh.mesh.simulator.time_variants import draw_times
@@ -20,6 +23,7 @@ from lsu_mesh.mesh.simulator.variants import (
     draw_lag,
     draw_variant,
 )
+from lsu_mesh.model import LSUModel
 
 SEEDS = range(40)
 STEPS = 60
@@ -72,7 +76,7 @@ def smoothing_seeds(demo: Path) -> list[int]:
     for seed in range(1, 200):
         variant = draw_variant(random.Random(seed), base)
         times = draw_times(random.Random(f"{seed}/times"), base) if variant.kinds else "as it is"
-        if ("cz", "LSUCZ") in variant.kinds and draw_lag(random.Random(f"{seed}/lag"), times):
+        if ("cz", "LSUCZ") in variant.kinds and draw_lag(random.Random(f"{seed}/lag"), base, times):
             found.append(seed)
     return found
 
@@ -82,6 +86,16 @@ def test_a_filter_with_a_lag_keeps_the_invariants(demo: Path) -> None:
         outcome = run_seed(demo, seed, STEPS, FAULTS)
         assert "lag=2" in outcome.variant
         assert outcome.broken == ""
+
+
+def test_a_filter_of_a_continuous_model_gets_no_lag(demo: Path, tmp_path: Path) -> None:
+    """A step of a continuous model may take several time updates, and a lag counts them."""
+    base = load(demo)
+    flow = LSUModel.continuous(np.zeros((3, 3)), None, np.eye(3), [1.0] * 3, [1.0] * 3)
+    drawn = [draw_lag(random.Random(seed), base, "") for seed in range(50)]
+    assert any(drawn)
+    moved = replace(base, continuous=flow)
+    assert not any(draw_lag(random.Random(seed), moved, "as it is") for seed in range(50))
 
 
 def test_the_set_of_another_step_is_found(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
