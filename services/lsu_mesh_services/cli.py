@@ -13,6 +13,7 @@ from lsu_mesh_services.extras import refusal
 from lsu_mesh_services.options import (
     bench,
     doctor,
+    gateway,
     graph,
     health,
     identify,
@@ -40,6 +41,7 @@ GROUPS = (
     graph,
     watch,
     health,
+    gateway,
     keys,
     view,
     replay,

@@ -30,7 +30,11 @@ class Extra(NamedTuple):
 
 MESH = Extra("mesh", {"eclipse-zenoh": "zenoh", "msgpack": "msgpack", "cryptography": "cryptography"})
 RECORD = Extra("record", {**MESH.modules, "rerun-sdk": "rerun", "pyarrow": "pyarrow"})
-EXTRAS = (MESH, RECORD)
+GATEWAY = Extra(
+    "gateway",
+    {**MESH.modules, "starlette": "starlette", "uvicorn": "uvicorn", "prometheus-client": "prometheus_client"},
+)
+EXTRAS = (MESH, RECORD, GATEWAY)
 
 Need: TypeAlias = Extra | Callable[[argparse.Namespace], Extra | None] | None
 """What a command says as ``extra``: the one it needs, how its options decide that, or None."""

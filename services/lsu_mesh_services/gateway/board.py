@@ -1,0 +1,183 @@
+"""What is known of the mesh now: the newest estimate of each estimator, the last events, the health of each peer.
+
+One thread records, others read. Whatever is recorded gets the next number, so that a reader asks for what is newer
+than what it has: an estimate that a slow reader has not taken is replaced, and nothing grows with the number of readers.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections import Counter, deque
+from collections.abc import Collection
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.messages import Event, Health, Message, Posterior
+from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
+from lsu_mesh_services.gateway.json_form import Json, dumps, estimate, whole
+
+KEPT_EVENTS = 256
+
+
+class Entry:
+    """A message that came, with its number and its JSON, made once for all readers."""
+
+    def __init__(self, number: int, message: Message, arrival_ns: int) -> None:
+        self.number, self.message, self.arrival_ns = number, message, arrival_ns
+
+    @property
+    def identity(self) -> str:
+        """The same after a restart of the gateway."""
+        return ":".join(map(str, self.message.reference))
+
+    @functools.cached_property
+    def brief(self) -> bytes:
+        """Without the set and its provenance."""
+        assert isinstance(self.message, Posterior)
+        return dumps(estimate(self.message, self.arrival_ns))
+
+    @functools.cached_property
+    def whole(self) -> bytes:
+        """All fields."""
+        return dumps(whole(self.message, self.arrival_ns))
+
+
+class Since(NamedTuple):
+    """A level, and since when a peer has it."""
+
+    level: str
+    since_ns: int
+
+
+class Connection(NamedTuple):
+    """How the gateway itself is connected."""
+
+    links: int = 0
+    trying: tuple[str, ...] = ()
+    refused: int = 0
+    last_refusal: str = ""
+
+
+class Board:
+    """Recorded by one thread, read by others."""
+
+    def __init__(self, configuration: Configuration, now: int) -> None:
+        self._lock = threading.Lock()
+        self._mesh = configuration.mesh.name
+        self._observer = HealthObserver(configuration, now)
+        self._estimates: dict[str, Entry] = {}
+        self._events: deque[Entry] = deque(maxlen=KEPT_EVENTS)
+        self._since: dict[str, Since] = {}
+        self._peers: list[PeerHealth] = []
+        self._number = 0
+        self._checked_ns = now
+        self.health_number = 0
+        """Of the last :meth:`check`; raised when a level changes, and once a second."""
+        self.connection = Connection()
+        self.counts: Counter[str] = Counter()
+        """Estimates that came, by estimator."""
+        self.check(now)
+
+    # -- recording
+
+    def record(self, message: Message, arrival_ns: int) -> None:
+        """A message of the mesh."""
+        with self._lock:
+            if isinstance(message, Posterior):
+                self.counts[message.name] += 1
+                known = self._estimates.get(message.name)
+                if known is None or _is_newer(message, known.message):
+                    self._estimates[message.name] = self._entry(message, arrival_ns)
+            elif isinstance(message, Event):
+                self._events.append(self._entry(message, arrival_ns))
+            elif isinstance(message, Health):
+                self._observer.record(message, arrival_ns)
+
+    def record_presence(self, name: str, is_there: bool) -> None:
+        """A peer has come or gone."""
+        with self._lock:
+            self._observer.record_presence(name, is_there)
+
+    def check(self, now: int, connection: Connection | None = None) -> None:
+        """Judge all peers."""
+        with self._lock:
+            changed = connection is not None and connection.links != self.connection.links
+            self.connection = connection or self.connection
+            self._peers = self._observer.peers(now)
+            for peer in self._peers:
+                if peer.name not in self._since or self._since[peer.name].level != peer.level:
+                    self._since[peer.name] = Since(peer.level, now)
+                    changed = True
+            if changed or now - self._checked_ns >= SECOND:
+                self._checked_ns = now
+                self._number += 1
+                self.health_number = self._number
+
+    def _entry(self, message: Message, arrival_ns: int) -> Entry:
+        self._number += 1
+        return Entry(self._number, message, arrival_ns)
+
+    # -- reading
+
+    def estimates(self, after: int = 0, names: Collection[str] | None = None) -> list[Entry]:
+        """The newest estimates with a number above ``after``, oldest first; of these estimators, or of all."""
+        with self._lock:
+            entries = list(self._estimates.values())
+        wanted = [one for one in entries if one.number > after and (names is None or one.message.name in names)]
+        return sorted(wanted, key=lambda entry: entry.number)
+
+    def events(self, after: int = 0) -> list[Entry]:
+        """The last events with a number above ``after``."""
+        with self._lock:
+            return [entry for entry in self._events if entry.number > after]
+
+    def number_of(self, identity: str) -> int:
+        """The number of an event that a reader has seen; 0 where it is not known any more."""
+        with self._lock:
+            return next((entry.number for entry in self._events if entry.identity == identity), 0)
+
+    @property
+    def peers(self) -> list[PeerHealth]:
+        """All peers as last judged."""
+        return self._peers
+
+    def health(self, now: int) -> Json:
+        """The mesh and every peer, with reasons and since when."""
+        with self._lock:
+            peers, since, connection = list(self._peers), dict(self._since), self.connection
+        return {
+            "mesh": self._mesh,
+            "level": worst([peer.level for peer in peers]),
+            "time_ns": str(now),
+            "links": connection.links,
+            "trying": [] if connection.links else list(connection.trying),
+            "refused": connection.refused,
+            "last_refusal": connection.last_refusal or None,
+            "peers": [_as_json(peer, since[peer.name].since_ns) for peer in peers],
+        }
+
+
+def _is_newer(message: Posterior, known: Message) -> bool:
+    """Whether it is of a later step, or a later revision, or of a process that started later."""
+    assert isinstance(known, Posterior)
+    if message.boot != known.boot:
+        return message.sent_ns > known.sent_ns
+    return (message.step, message.revision) >= (known.step, known.revision)
+
+
+def _as_json(peer: PeerHealth, since_ns: int) -> Json:
+    return {
+        "name": peer.name,
+        "role": peer.role,
+        "level": peer.level,
+        "reasons": list(peer.reasons),
+        "since": datetime.fromtimestamp(since_ns / 1e9, UTC).isoformat(timespec="milliseconds"),
+        "since_ns": str(since_ns),
+        "step": peer.step,
+        "age_s": None if peer.age_ns is None else peer.age_ns / SECOND,
+        "started_ns": None if peer.started_ns is None else str(peer.started_ns),
+        "host": peer.host,
+    }
