@@ -32,7 +32,7 @@ TAKEN: dict[str, set[str]] = {
     "model.rho": {*POSITIVE, "zero"}, "model.continuous": {"false"}, "model.input_delay": {"zero"},
     "model.schedule": {"empty list"}, "model.schedule[0].rho": {*POSITIVE, "zero"},
     "model.schedule[0].from": {*POSITIVE, "number in quotes", "date"},
-    "sensors.*.time_error": {"zero"}, "sensors.*.jitter": {"zero"}, "sensors.*.clock_error": {"zero"},
+    "sensors.*.time_error": {"zero"}, "mesh.future": {*POSITIVE, "zero"}, "mesh.past": {*POSITIVE, "zero"}, "sensors.*.jitter": {"zero"}, "sensors.*.clock_error": {"zero"},
     "sensors.*.every": POSITIVE, "sensors.*.grid_tolerance": {*POSITIVE, "zero"},
     "plant.name": {"number in quotes"},
     "plant.file": TEXT, "sensors.*.file": TEXT,
