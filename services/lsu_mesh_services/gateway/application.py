@@ -96,7 +96,7 @@ class Routes:
         return Response(self._page[name], media_type=PAGE[name], headers={"cache-control": "no-cache"})
 
     async def estimates(self, request: Request) -> EventStream:
-        """The newest estimates, of all estimators or of one."""
+        """Estimates as they come, of all estimators or of one; with ``rate`` only the newest of each, so often."""
         name = request.path_params.get("name")
         configuration = self._parts.configuration()
         known = [*configuration.filters, *configuration.fusion]
@@ -104,7 +104,8 @@ class Routes:
             remedy = nearest(name, known)
             raise Refusal(404, f"the mesh has no filter or fusion {name!r}", remedy, key="NAME", value=name)
         is_whole = _flag(request, "full")
-        feed = EstimateFeed(self._parts.board, None if name is None else (name,), is_whole)
+        names = None if name is None else (name,)
+        feed = EstimateFeed(self._parts.board, names, is_whole, only_newest="rate" in request.query_params)
         return self._stream(request, [feed])
 
     async def events(self, request: Request) -> EventStream:
@@ -114,7 +115,8 @@ class Routes:
     async def live(self, request: Request) -> EventStream:
         """Health, events and estimates in one stream: browsers open few connections to one host."""
         board, last = self._parts.board, request.headers.get("last-event-id", "")
-        return self._stream(request, [HealthFeed(board, self._parts.now), EventFeed(board, last), EstimateFeed(board)])
+        estimates = EstimateFeed(board, with_kept=True)
+        return self._stream(request, [HealthFeed(board, self._parts.now), EventFeed(board, last), estimates])
 
     async def health(self, request: Request) -> Response:
         """Every peer; status 503 where one is in error or gone."""
@@ -126,9 +128,7 @@ class Routes:
         configuration = self._parts.configuration()
         answer = msgspec.to_builtins(model_answer(configuration))
         start_ns = answer["start_ns"]
-        filters = [
-            {"name": one.name, "topic": "posterior", "kind": one.kind} for one in configuration.filters.values()
-        ]
+        filters = [{"name": one.name, "topic": "posterior", "kind": one.kind} for one in configuration.filters.values()]
         fusions = [{"name": name, "topic": "fused", "kind": "fusion"} for name in configuration.fusion]
         external = [name for name, sensor in configuration.sensors.items() if sensor.live == "external"]
         return _json(

@@ -1,15 +1,17 @@
 """What is known of the mesh now: the newest estimate of each estimator, the last events, the health of each peer.
 
-One thread records, others read. Whatever is recorded gets the next number, so that a reader asks for what is newer
-than what it has: an estimate that a slow reader has not taken is replaced, and nothing grows with the number of readers.
+One thread records, others read. Whatever is recorded gets the next number, so that a reader asks for what is newer than
+what it has. So many are kept and no more: of a slow reader newer estimates replace those that it has not taken, and
+nothing grows with the number of readers.
 """
 
 from __future__ import annotations
 
 import functools
+import itertools
 import threading
 from collections import Counter, deque
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -20,6 +22,8 @@ from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
 from lsu_mesh_services.gateway.json_form import Json, dumps, estimate, whole
 
 KEPT_EVENTS = 256
+KEPT_ESTIMATES = 512
+"""Of each estimator."""
 
 
 class Entry:
@@ -68,7 +72,8 @@ class Board:
         self._lock = threading.Lock()
         self._mesh = configuration.mesh.name
         self._observer = HealthObserver(configuration, now)
-        self._estimates: dict[str, Entry] = {}
+        self._estimates: dict[str, deque[Entry]] = {}
+        self._newest: dict[str, Entry] = {}
         self._events: deque[Entry] = deque(maxlen=KEPT_EVENTS)
         self._since: dict[str, Since] = {}
         self._peers: list[PeerHealth] = []
@@ -87,14 +92,18 @@ class Board:
         """A message of the mesh."""
         with self._lock:
             if isinstance(message, Posterior):
-                self.counts[message.name] += 1
-                known = self._estimates.get(message.name)
-                if known is None or _is_newer(message, known.message):
-                    self._estimates[message.name] = self._entry(message, arrival_ns)
+                self._record_estimate(message, arrival_ns)
             elif isinstance(message, Event):
                 self._events.append(self._entry(message, arrival_ns))
             elif isinstance(message, Health):
                 self._observer.record(message, arrival_ns)
+
+    def _record_estimate(self, message: Posterior, arrival_ns: int) -> None:
+        name, entry = message.name, self._entry(message, arrival_ns)
+        self.counts[name] += 1
+        self._estimates.setdefault(name, deque(maxlen=KEPT_ESTIMATES)).append(entry)
+        if name not in self._newest or _is_newer(message, self._newest[name].message):
+            self._newest[name] = entry
 
     def record_presence(self, name: str, is_there: bool) -> None:
         """A peer has come or gone."""
@@ -122,12 +131,16 @@ class Board:
 
     # -- reading
 
-    def estimates(self, after: int = 0, names: Collection[str] | None = None) -> list[Entry]:
-        """The newest estimates with a number above ``after``, oldest first; of these estimators, or of all."""
+    def newest(self, after: int = 0, names: Collection[str] | None = None) -> list[Entry]:
+        """The newest estimate of each of these estimators, or of all, where its number is above ``after``."""
         with self._lock:
-            entries = list(self._estimates.values())
-        wanted = [one for one in entries if one.number > after and (names is None or one.message.name in names)]
-        return sorted(wanted, key=lambda entry: entry.number)
+            return _in_order([one for one in self._newest.values() if one.number > after], names)
+
+    def estimates(self, after: int = 0, names: Collection[str] | None = None) -> list[Entry]:
+        """All kept estimates with a number above ``after``, as they came; of these estimators, or of all."""
+        with self._lock:
+            found = [one for kept in self._estimates.values() for one in _newer(kept, after)]
+        return _in_order(found, names)
 
     def events(self, after: int = 0) -> list[Entry]:
         """The last events with a number above ``after``."""
@@ -158,6 +171,16 @@ class Board:
             "last_refusal": connection.last_refusal or None,
             "peers": [_as_json(peer, since[peer.name].since_ns) for peer in peers],
         }
+
+
+def _newer(kept: deque[Entry], after: int) -> Iterator[Entry]:
+    """From the newest on, as far as numbers are above ``after``."""
+    return itertools.takewhile(lambda entry: entry.number > after, reversed(kept))
+
+
+def _in_order(entries: Iterable[Entry], names: Collection[str] | None) -> list[Entry]:
+    wanted = [one for one in entries if names is None or one.message.name in names]
+    return sorted(wanted, key=lambda entry: entry.number)
 
 
 def _is_newer(message: Posterior, known: Message) -> bool:

@@ -37,15 +37,22 @@ class Feed(Protocol):
 
 @dataclass
 class EstimateFeed:
-    """The newest estimate of each estimator, or of some."""
+    """Every estimate, of all estimators or of some, as far as they are kept; from the newest of each on."""
 
     board: Board
     names: Collection[str] | None = None
     is_whole: bool = False
-    _after: int = 0
+    """Whether sets and provenance are told too."""
+    only_newest: bool = False
+    """Whether estimates that came in between are left out."""
+    with_kept: bool = False
+    """Whether what was kept before comes first."""
+    _after: int | None = None
 
     def __call__(self) -> bytes:
-        entries = self.board.estimates(self._after, self.names)
+        is_first = self._after is None and not self.with_kept
+        read = self.board.newest if self.only_newest or is_first else self.board.estimates
+        entries = read(self._after or 0, self.names)
         if not entries:
             return b""
         self._after = entries[-1].number

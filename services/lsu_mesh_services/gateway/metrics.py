@@ -57,7 +57,7 @@ class MeshMetrics(Collector):
         age = GaugeMetricFamily("lsu_estimate_age_seconds", "Time since the newest estimate came.", labels=labels)
         step = GaugeMetricFamily("lsu_estimate_step", "Step of the newest estimate.", labels=labels)
         count = CounterMetricFamily("lsu_estimates", "Estimates that came to the gateway.", labels=labels)
-        for entry in self._board.estimates():
+        for entry in self._board.newest():
             message = entry.message
             assert isinstance(message, Posterior)
             who = [message.topic, message.name]
