@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import socket
 import sys
 from pathlib import Path
@@ -28,6 +29,10 @@ from lsu_mesh_services.gateway.token import WrongToken, read_or_make
 from lsu_mesh_services.session import session_settings, with_session
 
 
+PRIORITY = 5
+"""How far the process stands back (``nice``): where processors are short, the mesh is served before its readers."""
+
+
 def main(options: argparse.Namespace) -> int:
     configuration = load_or_explain(options.config, options)
     if configuration is None:
@@ -43,6 +48,7 @@ def main(options: argparse.Namespace) -> int:
     except WrongHttpAddress as error:
         print(error, file=sys.stderr)
         return COULD_NOT_START
+    os.nice(PRIORITY)
     with listener:
         address = bound(listener, address)
         return with_session("gateway", lambda: _serve(configuration, options, token, listener=listener, at=address))

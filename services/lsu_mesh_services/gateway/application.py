@@ -33,6 +33,8 @@ from lsu_mesh_services.gateway.token import is_token
 MAX_CLIENTS = 512
 """Streams that are open at a time."""
 RATE_HZ, MAX_RATE_HZ = 10.0, 50.0
+"""Parcels a second: so often a client is sent what is new."""
+EVENT_RATE_HZ = 4.0
 PAGE = {
     "index.html": "text/html; charset=utf-8",
     "gateway.css": "text/css; charset=utf-8",
@@ -110,7 +112,8 @@ class Routes:
 
     async def events(self, request: Request) -> EventStream:
         """The events of the mesh; a client that comes back gets those it has missed."""
-        return self._stream(request, [EventFeed(self._parts.board, request.headers.get("last-event-id", ""))])
+        feed = EventFeed(self._parts.board, request.headers.get("last-event-id", ""))
+        return self._stream(request, [feed], EVENT_RATE_HZ)
 
     async def live(self, request: Request) -> EventStream:
         """Health, events and estimates in one stream: browsers open few connections to one host."""
@@ -164,21 +167,21 @@ class Routes:
             remedy = "send the header `Authorization: Bearer TOKEN`; the file of the token was told at the start"
             raise Refusal(401, "the token is missing or wrong", remedy)
 
-    def _stream(self, request: Request, feeds: list[Feed]) -> EventStream:
+    def _stream(self, request: Request, feeds: list[Feed], usual_hz: float = RATE_HZ) -> EventStream:
         if self._parts.clients.is_full:
             raise Refusal(503, f"{MAX_CLIENTS} streams are open, and no more are served", "close one and come back")
-        return EventStream(feeds, self._parts.clients, 1.0 / _rate(request))
+        return EventStream(feeds, self._parts.clients, 1.0 / _rate(request, usual_hz))
 
 
-def _rate(request: Request) -> float:
-    text = request.query_params.get("rate", str(RATE_HZ))
+def _rate(request: Request, usual_hz: float) -> float:
+    text = request.query_params.get("rate", str(usual_hz))
     try:
         rate = float(text)
     except ValueError:
         rate = 0.0
     if not 0.0 < rate <= MAX_RATE_HZ:
         text_of = f"rate is {text[:40]!r}, expected a number above 0 and up to {MAX_RATE_HZ:g}"
-        raise Refusal(400, text_of, f"leave it out for {RATE_HZ:g} a second", key="rate", value=text)
+        raise Refusal(400, text_of, f"leave it out for {usual_hz:g} a second", key="rate", value=text)
     return rate
 
 
