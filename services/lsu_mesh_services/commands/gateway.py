@@ -28,7 +28,6 @@ from lsu_mesh_services.gateway.server import serve
 from lsu_mesh_services.gateway.token import WrongToken, read_or_make
 from lsu_mesh_services.session import session_settings, with_session
 
-
 PRIORITY = 5
 """How far the process stands back (``nice``): where processors are short, the mesh is served before its readers."""
 

@@ -19,11 +19,14 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Event, Health, Message, Posterior
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
-from lsu_mesh_services.gateway.json_form import Json, dumps, estimate, whole
+from lsu_mesh_services.gateway.json_form import Json, dumps, estimate, server_sent, whole
 
 KEPT_EVENTS = 256
 KEPT_ESTIMATES = 512
 """Of each estimator."""
+
+
+KEPT_PARCELS = 8
 
 
 class Entry:
@@ -39,14 +42,19 @@ class Entry:
 
     @functools.cached_property
     def brief(self) -> bytes:
-        """Without the set and its provenance."""
+        """An estimate without the set and its provenance, as an event of a stream."""
         assert isinstance(self.message, Posterior)
-        return dumps(estimate(self.message, self.arrival_ns))
+        return server_sent("estimate", dumps(estimate(self.message, self.arrival_ns)))
 
     @functools.cached_property
     def whole(self) -> bytes:
-        """All fields."""
-        return dumps(whole(self.message, self.arrival_ns))
+        """An estimate with all fields, as an event of a stream."""
+        return server_sent("estimate", dumps(whole(self.message, self.arrival_ns)))
+
+    @functools.cached_property
+    def event(self) -> bytes:
+        """An event of the mesh, as an event of a stream."""
+        return server_sent("event", dumps(whole(self.message, self.arrival_ns)), self.identity)
 
 
 class Since(NamedTuple):
@@ -77,6 +85,7 @@ class Board:
         self._events: deque[Entry] = deque(maxlen=KEPT_EVENTS)
         self._since: dict[str, Since] = {}
         self._peers: list[PeerHealth] = []
+        self._parcels: dict[tuple[int, tuple[str, ...] | None, bool, bool, int], tuple[int, bytes]] = {}
         self._number = 0
         self._checked_ns = now
         self.health_number = 0
@@ -141,6 +150,21 @@ class Board:
         with self._lock:
             found = [one for kept in self._estimates.values() for one in _newer(kept, after)]
         return _in_order(found, names)
+
+    def parcel(
+        self, after: int, names: tuple[str, ...] | None, *, only_newest: bool, is_whole: bool
+    ) -> tuple[int, bytes]:
+        """Estimates after a number as text, and the number that it reaches; made once for readers that ask alike."""
+        asked = (after, names, only_newest, is_whole, self._number)
+        parcel = self._parcels.get(asked)
+        if parcel is None:
+            entries = (self.newest if only_newest else self.estimates)(after, names)
+            text = b"".join(entry.whole if is_whole else entry.brief for entry in entries)
+            parcel = (entries[-1].number if entries else after, text)
+            if len(self._parcels) >= KEPT_PARCELS:
+                self._parcels.clear()
+            self._parcels[asked] = parcel
+        return parcel
 
     def events(self, after: int = 0) -> list[Entry]:
         """The last events with a number above ``after``."""

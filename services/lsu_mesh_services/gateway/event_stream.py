@@ -14,7 +14,7 @@ from typing import Protocol
 from starlette.types import Receive, Scope, Send
 
 from lsu_mesh_services.gateway.board import Board
-from lsu_mesh_services.gateway.json_form import dumps
+from lsu_mesh_services.gateway.json_form import dumps, server_sent
 
 HEARTBEAT_S = 10.0
 """A comment after so long without anything else, so that both ends notice a connection that is gone."""
@@ -40,7 +40,7 @@ class EstimateFeed:
     """Every estimate, of all estimators or of some, as far as they are kept; from the newest of each on."""
 
     board: Board
-    names: Collection[str] | None = None
+    names: tuple[str, ...] | None = None
     is_whole: bool = False
     """Whether sets and provenance are told too."""
     only_newest: bool = False
@@ -51,12 +51,9 @@ class EstimateFeed:
 
     def __call__(self) -> bytes:
         is_first = self._after is None and not self.with_kept
-        read = self.board.newest if self.only_newest or is_first else self.board.estimates
-        entries = read(self._after or 0, self.names)
-        if not entries:
-            return b""
-        self._after = entries[-1].number
-        return b"".join(server_sent("estimate", one.whole if self.is_whole else one.brief) for one in entries)
+        only_newest, after = self.only_newest or is_first, self._after or 0
+        self._after, parcel = self.board.parcel(after, self.names, only_newest=only_newest, is_whole=self.is_whole)
+        return parcel
 
 
 @dataclass
@@ -74,7 +71,7 @@ class EventFeed:
         if not entries:
             return b""
         self._after = entries[-1].number
-        return b"".join(server_sent("event", one.whole, one.identity) for one in entries)
+        return b"".join(entry.event for entry in entries)
 
 
 @dataclass
@@ -90,12 +87,6 @@ class HealthFeed:
             return b""
         self._after = self.board.health_number
         return server_sent("health", dumps(self.board.health(self.now())))
-
-
-def server_sent(event: str, data: bytes, identity: str = "") -> bytes:
-    """One event on the wire; ``data`` is one line."""
-    head = f"event: {event}\n" + (f"id: {identity}\n" if identity else "")
-    return b"%sdata: %s\n\n" % (head.encode(), data)
 
 
 @dataclass
@@ -143,11 +134,17 @@ class EventStream:
             if new:
                 await self._write(send, new)
                 silent_s = 0.0
-            await asyncio.sleep(self.period_s)
+            await asyncio.sleep(_until_next(self.period_s))
             silent_s += self.period_s
 
     async def _write(self, send: Send, body: bytes) -> None:
         await send({"type": "http.response.body", "body": body, "more_body": True})
+
+
+def _until_next(period_s: float) -> float:
+    """Seconds to the next parcel: all clients are served at the same moments, so that they share what is written."""
+    now = asyncio.get_running_loop().time()
+    return period_s - now % period_s
 
 
 async def _left(receive: Receive) -> None:
