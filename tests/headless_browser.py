@@ -95,8 +95,9 @@ class Page:
         self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
     def open(self, url: str) -> None:
-        """Load a page."""
+        """Load a page, and wait until it is there."""
         self.ask("Page.navigate", url=url)
+        self.until(f"document.readyState === 'complete' && location.href.startsWith({json.dumps(url)})")
 
     def value(self, expression: str) -> Any:
         """What a JavaScript expression gives; a promise is awaited."""
