@@ -34,7 +34,8 @@ GATEWAY = Extra(
     "gateway",
     {**MESH.modules, "starlette": "starlette", "uvicorn": "uvicorn", "prometheus-client": "prometheus_client"},
 )
-EXTRAS = (MESH, RECORD, GATEWAY)
+MCAP = Extra("mcap", {**RECORD.modules, "mcap": "mcap"})
+EXTRAS = (MESH, RECORD, GATEWAY, MCAP)
 
 Need: TypeAlias = Extra | Callable[[argparse.Namespace], Extra | None] | None
 """What a command says as ``extra``: the one it needs, how its options decide that, or None."""

@@ -13,7 +13,7 @@ import pytest
 from lsu_mesh_services import extras
 from lsu_mesh_services.cli import build_parser, main
 from lsu_mesh_services.exit_codes import COULD_NOT_START, NOT_MET, OK
-from lsu_mesh_services.extras import MESH, RECORD, Extra
+from lsu_mesh_services.extras import GATEWAY, MCAP, MESH, RECORD, Extra
 from without_modules import without
 
 FILE = "x.rrd"
@@ -28,6 +28,8 @@ NEEDS = (
         f"recording merge {FILE}", f"recording export {FILE} --format parquet", f"identify m.toml --recording {FILE}",
         "bench recording",
     )),
+    (GATEWAY, ("gateway", "gateway --http 127.0.0.1:0")),
+    (MCAP, (f"recording export {FILE} --format mcap",)),
 )  # fmt: skip
 NONE = (
     "validate m.toml",

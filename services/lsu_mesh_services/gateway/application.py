@@ -18,11 +18,11 @@ from starlette.types import ASGIApp
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.problem import nearest
+from lsu_mesh.mesh.json_form import Json, dumps
 from lsu_mesh.mesh.model_answer import model_answer
 from lsu_mesh_services.gateway.board import Board
 from lsu_mesh_services.gateway.event_stream import Clients, EstimateFeed, EventFeed, EventStream, Feed, HealthFeed
 from lsu_mesh_services.gateway.http_address import AllowedHosts
-from lsu_mesh_services.gateway.json_form import Json, dumps
 from lsu_mesh_services.gateway.measurement_request import MAX_BODY, read_reading, sensor_of
 from lsu_mesh_services.gateway.metrics import MeshMetrics, exposition
 from lsu_mesh_services.gateway.protection import Protection

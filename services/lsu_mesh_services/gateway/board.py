@@ -16,10 +16,11 @@ from datetime import UTC, datetime
 from typing import NamedTuple
 
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.json_form import Json, dumps, estimate, whole
 from lsu_mesh.mesh.messages import Event, Health, Message, Posterior
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
-from lsu_mesh_services.gateway.json_form import Json, dumps, estimate, server_sent, whole
+from lsu_mesh_services.gateway.server_sent import server_sent
 
 KEPT_EVENTS = 256
 KEPT_ESTIMATES = 512

@@ -13,8 +13,9 @@ from typing import Protocol
 
 from starlette.types import Receive, Scope, Send
 
+from lsu_mesh.mesh.json_form import dumps
 from lsu_mesh_services.gateway.board import Board
-from lsu_mesh_services.gateway.json_form import dumps, server_sent
+from lsu_mesh_services.gateway.server_sent import server_sent
 
 HEARTBEAT_S = 10.0
 """A comment after so long without anything else, so that both ends notice a connection that is gone."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from starlette.responses import Response
 
-from lsu_mesh_services.gateway.json_form import dumps
+from lsu_mesh.mesh.json_form import dumps
 
 MAX_SHOWN = 200
 

@@ -6,8 +6,8 @@ import json
 from typing import Any
 
 import pytest
-from lsu_mesh_services.gateway.json_form import dumps, estimate, whole
 
+from lsu_mesh.mesh.json_form import dumps, estimate, whole
 from lsu_mesh.mesh.message_examples import example
 from lsu_mesh.mesh.messages import TYPES, Posterior
 

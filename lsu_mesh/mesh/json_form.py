@@ -25,12 +25,6 @@ def dumps(value: object) -> bytes:
     return msgspec.json.encode(value)
 
 
-def server_sent(event: str, data: bytes, identity: str = "") -> bytes:
-    """One event of a stream of server-sent events; ``data`` is one line."""
-    head = f"event: {event}\n" + (f"id: {identity}\n" if identity else "")
-    return b"%sdata: %s\n\n" % (head.encode(), data)
-
-
 def whole(message: Message, arrival_ns: int) -> Json:
     """All fields of a message."""
     return {
