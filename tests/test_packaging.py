@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from lsu_mesh_services.extras import EXTRAS
+from lsu_mesh_services.gateway.application import PAGE
 
 BUILD = "import sys; from hatchling import build as b; print(b.build_{kind}(sys.argv[1]))"
 STRAYS = (
@@ -86,7 +87,8 @@ def test_a_wheel_installs_our_two_packages_with_their_data_and_nothing_else(whee
     }
     assert set(wheel) - metadata == packages
     others = {name for name in packages if not name.endswith(".py")}
-    assert others == {"lsu_mesh/py.typed", "lsu_mesh_services/py.typed", "lsu_mesh_services/demo.toml"}
+    page = {f"lsu_mesh_services/gateway/page/{name}" for name in PAGE}
+    assert others == page | {"lsu_mesh/py.typed", "lsu_mesh_services/py.typed", "lsu_mesh_services/demo.toml"}
     assert b"lsu-mesh = lsu_mesh_services.cli:entry" in b"".join(wheel[name] for name in metadata)
 
 
