@@ -123,9 +123,12 @@ class RecorderService:
         self._queue = self._longest_ns = 0
         """The longest queue and turn since the last health message."""
         self._roles = {name: role for role, name in configuration.peers()}
-        others = [name for name in self._roles if name != ROLE_NAME]
+        others = [
+            name for role, name in configuration.peers()
+            if name != ROLE_NAME and not configuration.is_external(role, name)
+        ]  # fmt: skip
         self._source_timeouts = SourceTimeouts(configuration, [("health", name) for name in others], others)
-        """Everybody tells its health every second; of whom nothing is heard, nothing is recorded."""
+        """Every peer of the mesh tells its health every second; of whom nothing is heard, nothing is recorded."""
 
     def declare(self) -> None:
         """Subscribe to all topics, watch the peers, show that the recorder is there."""
