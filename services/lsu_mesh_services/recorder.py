@@ -18,8 +18,8 @@ from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
+from lsu_mesh_services.mesh_start import MeshStart
 from lsu_mesh_services.network.gap_recovery import GapRecovery
-from lsu_mesh_services.network.mesh_start import MeshStart
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lsu_mesh_services.network.mesh_start import MeshStart
+from lsu_mesh_services.mesh_start import MeshStart
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recorder import RecorderService
 
