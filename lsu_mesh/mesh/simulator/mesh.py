@@ -15,17 +15,16 @@ from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import SECOND, Node
 from lsu_mesh.mesh.nodes.plant import PlantNode
-from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.nodes.schedule import GridSchedule, Schedule
 from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
 from lsu_mesh.mesh.simulator.decoding import Reader, SharedDecoder
-from lsu_mesh.mesh.simulator.faults import FaultPlan, Skew
+from lsu_mesh.mesh.simulator.external_sensor import ExternalSensor
+from lsu_mesh.mesh.simulator.faults import START_NS, FaultPlan, Skew
 from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
 from lsu_mesh.mesh.simulator.transport import MILLISECOND, Links, Port, Transport
 
 MAX_WAIT_NS = SECOND // 10
-START_NS = 1_000 * SECOND
-"""True time at which step 1 is due; far from zero, so that no skewed clock is negative."""
 LAST_ANSWERED = 0.7
 """Chance that the question for the last own posterior, asked at the start of a process, finds somebody."""
 
@@ -121,7 +120,10 @@ class Process:
 
     def _take(self, arrival: Arrival) -> list[Message]:
         """What ``Node.deliver`` does, with the witness between admission and node."""
-        message = self.node.admission.admit(arrival.key, arrival.payload)
+        refused = self.node.admission.refused
+        before = refused["future"] + refused["past"]
+        message = self.node.admission.admit(arrival.key, arrival.payload, arrival.at)
+        self._mesh.witness.untrue_times += refused["future"] + refused["past"] - before
         if message is None:
             return []
         self._mesh.witness.admitted(self.node, message)
@@ -149,7 +151,7 @@ class SimulatedMesh:
         self.witness = witness
         self.agenda = Agenda(rng)
         self.links = Links(plan, rng)
-        self.transport = Transport(plan, rng, self.links, self.agenda.add)
+        self.transport = Transport(plan, rng, self.links, self.agenda.add, is_live=self._is_live)
         self.processes: dict[str, Process] = {}
         self.stored: list[Reference] = []
         """What the recorder has on its disk."""
@@ -200,7 +202,13 @@ class SimulatedMesh:
 
     def _made(self, role: str, name: str, boot: str) -> Node:
         if role == "plant":
-            return PlantNode(self.configuration, name, boot, Schedule(START_NS, self.configuration.mesh.rate))
+            is_live, rate = self.configuration.mesh.is_live, self.configuration.mesh.rate
+            schedule = GridSchedule(self.configuration.grid) if is_live else Schedule(START_NS, rate)
+            return PlantNode(self.configuration, name, boot, schedule)
+        if role == "sensor" and self.configuration.sensors[name].is_live:
+            steps = self._plan.clock_steps.get(name, ())
+            last = (self.configuration.mesh.steps or 0) + 1
+            return ExternalSensor(self.configuration, name, boot, clock_steps=steps, steps=last)
         if role == "sensor":
             return SimulatedSensorNode(self.configuration, name, boot)
         if role == "filter":
@@ -215,7 +223,7 @@ class SimulatedMesh:
         for other in self.processes.values():
             self._announce(process, other, at)
             for key in other.port.caches:
-                if self._listens(node, key):
+                if self._listens(node, key) and not self._is_live(key):
                     self.agenda.add(at + delay, self._history_of(other, process, key))
             if isinstance(other.node, FusionNode) and node.name in other.node.sources and node.role == "filter":
                 self.agenda.add(at + delay, self._last_of(other, process))
@@ -279,6 +287,10 @@ class SimulatedMesh:
             self._listeners[key] = listeners
         for name in listeners:
             self.transport.send(sample, sender.port, self.processes[name].port, at)
+
+    def _is_live(self, key: str) -> bool:
+        _, _, _, topic, name = key.split("/")
+        return self.configuration.is_live(topic, name)
 
     def _listens(self, node: Node, key: str) -> bool:
         _, _, mesh, topic, name = key.split("/")
