@@ -7,6 +7,7 @@ MESH = """
 name = "lab"
 dt = 0.1
 start_time = "2026-05-01T12:00:00Z"
+past = 1000000000
 [model]
 continuous = true
 states = ["position", "speed"]

@@ -51,6 +51,8 @@ def _safe(values: Mapping[str, Any]) -> Json:
 def _safe_value(name: str, value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool) and (name.endswith("_ns") or name == "seq"):
         return str(value)
+    if isinstance(value, dict):
+        return _safe(value)
     if name == "base" and isinstance(value, list | tuple):
         return _reference(value)
     return [_reference(one) for one in value] if name == "used" else value

@@ -10,8 +10,10 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
+from external_mesh import ExternalMesh
 from gateway_mesh import MESH, START_NS
 from gateway_process import Gateway
 from live_mesh import LiveMesh
@@ -114,6 +116,47 @@ def test_with_tls_the_gateway_publishes_only_where_it_has_the_certificate(tmp_pa
         assert "with TLS, the gateway may publish only where its certificate allows" in told["error"]
         assert "gauge.key" in told["error"]
         assert bus.next(0.5) is None
+
+
+def test_a_filter_uses_what_was_sent_over_http(tmp_path: Path) -> None:
+    """A mesh that agrees on its start when it begins; the gateway learns it, and learns the next one."""
+    with ExternalMesh(tmp_path) as mesh:
+        arguments = ["-c", str(mesh.file), "-X", f"network.entry={mesh.entry}"]
+        with Gateway(tmp_path, arguments) as gateway:
+            until(lambda: gateway.health()["links"] > 0, "it is connected")
+            token = (tmp_path / "mesh.gateway-token").read_text().strip()
+            allowed = {"authorization": f"Bearer {token}"}
+            status, told = gateway.ask("POST", "/measurements/gauge", {"y": [0.0]}, **allowed)
+            assert (status, "has told when it started" in told["error"]) == (503, True)
+            for _ in range(2):
+                child = mesh.start("filter", "box")
+                seen = estimates_by_http(gateway, allowed)
+                assert any(one["lower"][0] < 0.5 < one["upper"][0] for one in seen)
+                assert {reference[1] for one in seen for reference in one["used"]} == {"sensor/gauge", "sensor/speed"}
+                assert child.process is not None
+                mesh.supervisor.children.remove(child)
+                child.process.kill()
+                child.process.wait()
+                assert child.reader is not None
+                child.reader.join(timeout=10)
+            assert gateway.stop() == 0
+
+
+def estimates_by_http(gateway: Gateway, allowed: dict[str, str]) -> list[Any]:
+    """Estimates of the filter that used what is sent meanwhile."""
+    seen: list[Any] = []
+
+    def send() -> bool:
+        for name, value in (("gauge", 0.5), ("speed", 0.0)):
+            gateway.ask("POST", f"/measurements/{name}", {"y": [value], "time": "now"}, **allowed)
+        with gateway.stream("/estimates/box?full=1&rate=50") as stream:
+            seen.append(next(stream)[2])
+        return len([one for one in seen if one["used"] and one["kind"]]) >= 10 and not seen[-1]["missing"]
+
+    until(lambda: "box" in gateway.levels() and gateway.levels()["box"] == "OK", "the filter is there", 60)
+    until(lambda: gateway.ask("POST", "/measurements/gauge", {"y": [0.5]}, **allowed)[0] == 202, "it has started", 60)
+    until(send, "the filter uses what was sent", 60)
+    return seen[-5:]
 
 
 def latency_ms(mesh: LiveMesh, seconds: float) -> float:

@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from lsu_mesh.mesh.json_form import dumps, estimate, whole
 from lsu_mesh.mesh.message_examples import example
@@ -31,6 +32,11 @@ def test_no_number_of_a_whole_message_is_too_large(topic: str) -> None:
     assert told["seq"] == "41"
     assert (told["topic"], told["name"], told["step"]) == (topic, "box", 42)
     assert all(abs(number) < SAFE for number in numbers(told))
+
+
+def test_times_that_an_event_is_about_are_strings_too() -> None:
+    event = structs.replace(example("event"), about={"start_ns": 1_700_000_000_000_000_001, "gap": 0.5, "step": 3})
+    assert whole(event, 1)["about"] == {"start_ns": "1700000000000000001", "gap": 0.5, "step": 3}
 
 
 def test_a_whole_posterior_has_its_set_and_provenance() -> None:

@@ -152,7 +152,7 @@ class Routes:
         sensor = sensor_of(configuration, name)
         assert self._parts.publisher is not None, "there is an external sensor"
         body = await _body(request)
-        reading = read_reading(sensor, body, self._parts.now(), future_ns=configuration.mesh.future_ns)
+        reading = read_reading(sensor, body, self._parts.now())
         sent = await run_in_threadpool(self._parts.publisher.publish, configuration, name, reading)
         told = {"src": sent.src, "boot": sent.boot, "seq": str(sent.seq), "step": sent.step}
         return _json(told | {"time_ns": str(sent.time_ns), "time_error_ns": str(sent.time_error_ns)}, 202)

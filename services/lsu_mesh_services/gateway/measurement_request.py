@@ -15,7 +15,6 @@ from lsu_mesh.mesh.config.expected import Unfit, shown, span_ns
 from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.config.settings import SensorSettings
 from lsu_mesh.mesh.data_files.iso_times import IsoTimes
-from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh_services.gateway.refusal import Refusal
 
 KEYS = ("y", "time", "time_error")
@@ -57,8 +56,8 @@ def sensor_of(configuration: Configuration, name: str) -> SensorSettings:
     return sensor
 
 
-def read_reading(sensor: SensorSettings, body: bytes, now: int, *, future_ns: int) -> Reading:
-    """The reading in a body; ``future_ns``: how far its time may be ahead of ``now``.
+def read_reading(sensor: SensorSettings, body: bytes, now: int) -> Reading:
+    """The reading in a body that came ``now``.
 
     Raises
     ------
@@ -74,12 +73,7 @@ def read_reading(sensor: SensorSettings, body: bytes, now: int, *, future_ns: in
     for key in values:
         if key not in KEYS:
             raise Refusal(422, f"unknown key {key!r}", nearest(key, KEYS), key=key, value=values[key])
-    time_ns = _time(values.get("time", "now"), now)
-    if time_ns > now + future_ns:
-        ahead = (time_ns - now) / SECOND
-        text = f"the time is {ahead:.3g} s ahead of the gateway's clock, more than [mesh] future allows"
-        raise Refusal(422, text, 'set the clock of the sensor, or send "now"', key="time", value=values["time"])
-    return Reading(_y(sensor, values), time_ns, _time_error(sensor, values))
+    return Reading(_y(sensor, values), _time(values.get("time", "now"), now), _time_error(sensor, values))
 
 
 def _y(sensor: SensorSettings, values: dict[str, Any]) -> list[float | None]:

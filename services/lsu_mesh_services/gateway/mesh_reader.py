@@ -20,6 +20,8 @@ from lsu_mesh_services.network.receive_queue import Arrival
 LIVE = ("posterior", "fused", "health")
 CHECK_NS = SECOND // 4
 ASK_NS = SECOND
+SILENT_NS = 3 * SECOND
+"""A mesh of which nothing came for so long is over."""
 
 
 class MeshReader:
@@ -33,7 +35,7 @@ class MeshReader:
         self._bus, self._clock, self._trying = bus, clock, trying
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, name="mesh reader", daemon=True)
-        self._next_check = self._next_question = 0
+        self._next_check = self._next_question = self._admitted_ns = 0
         self.failure: Exception | None = None
 
     def __enter__(self) -> MeshReader:
@@ -67,10 +69,11 @@ class MeshReader:
                 self.board.record_presence(address.name, arrival.what == "alive")
                 self._next_check = 0
         elif arrival.key == model_key(self.configuration.mesh.name):
-            self._learn_start(arrival.payload)
+            self._learn_start(arrival.payload, arrival.arrival_ns)
         else:
             message = self._admission.admit(arrival.key, arrival.payload)
             if message is not None:
+                self._admitted_ns = arrival.arrival_ns
                 self.board.record(message, arrival.arrival_ns)
 
     def _check(self, now: int) -> None:
@@ -82,14 +85,21 @@ class MeshReader:
         self.board.check(now, Connection(self._bus.links(), self._trying, refused.total(), last))
         if self.configuration.mesh.starts_now and now >= self._next_question:
             self._next_question = now + ASK_NS
-            self._bus.ask(model_key(self.configuration.mesh.name))
+            self._bus.ask_all(model_key(self.configuration.mesh.name))
 
-    def _learn_start(self, payload: bytes) -> None:
-        """The time of step 0, which the digest of what follows may hold."""
+    def _learn_start(self, payload: bytes, now: int) -> None:
+        """The time of step 0, which the digest of what follows holds.
+
+        Of two starts the earlier stands. A later one is that of a mesh that was started again, if the other is silent.
+        """
         try:
-            start_ns = msgspec.msgpack.decode(payload, type=ModelAnswer).start_ns
+            told_ns = msgspec.msgpack.decode(payload, type=ModelAnswer).start_ns
         except msgspec.DecodeError:
             return
-        if start_ns is not None and start_ns != self.configuration.mesh.start_ns:
-            self.configuration = self.configuration.started(start_ns)
+        known_ns = self.configuration.mesh.start_ns
+        if told_ns is None or told_ns == known_ns:
+            return
+        if known_ns is None or told_ns < known_ns or now - self._admitted_ns > SILENT_NS:
+            self.configuration = self.configuration.started(told_ns)
             self._admission = Admission(self.configuration, TYPES)
+            self._admitted_ns = now

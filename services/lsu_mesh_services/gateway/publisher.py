@@ -9,6 +9,7 @@ import threading
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import key
+from lsu_mesh.mesh.live_times import check_live_time
 from lsu_mesh.mesh.measurement_time import placed
 from lsu_mesh.mesh.messages import VERSION, Measurement, Refused, encode, encoding
 from lsu_mesh_services.bus import Bus, Clock, NoSession
@@ -38,12 +39,12 @@ class Publisher:
         Raises
         ------
         Refusal
-            403 without the sensor's certificate, 409 where the model cannot use a datum of this time, 503 where the
-            mesh has not told its start or nobody is connected.
+            403 without the sensor's certificate, 422 where the time cannot be true, 409 where the model cannot use a
+            datum of this time, 503 where the mesh has not told its start or nobody is connected.
         """
         with self._lock:
             message = self._message(configuration, name, reading)
-            found = _placed(configuration, message)
+            found = _checked(configuration, message)
             bus = self._session(configuration, name)
             if not self._bus.links():
                 text = "the gateway is connected to nobody; the measurement was not sent"
@@ -90,10 +91,16 @@ class Publisher:
         return self._sessions[name]
 
 
-def _placed(configuration: Configuration, message: Measurement) -> Measurement:
+def _checked(configuration: Configuration, message: Measurement) -> Measurement:
+    """The message with its step, if those who receive it will take it."""
     if configuration.awaits_start:
         text = "no estimator of the mesh has told when it started, so no time can be brought to a step"
         raise Refusal(503, text, "start the mesh with `lsu-mesh run`, then send again")
+    try:
+        check_live_time(configuration, message, message.sent_ns)
+    except Refused as refused:
+        remedy = 'correct the clock of the sensor, or send "time": "now"'
+        raise Refusal(422, str(refused), remedy, key="time", value=message.time_ns) from None
     try:
         return placed(configuration, message)
     except Refused as refused:
