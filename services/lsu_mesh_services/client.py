@@ -40,7 +40,7 @@ Time = datetime | str | Decimal | Fraction | int | float
 Value = float | int | Decimal | Fraction | None
 NS, MAX_NS = 10**9, 2**63
 LEASE_MS, HEARTBEAT_S, LEAST_CACHED, CACHED_S = 2000, 0.1, 256, 6
-ASK_EVERY_S, ANSWER_S, SILENT_S, LOOK_EVERY_S = 1.0, 0.9, 3.0, 0.1
+ASK_EVERY_S, ANSWER_S, TELL_AFTER_S, SILENT_S, LOOK_EVERY_S = 1.0, 0.9, 0.5, 3.0, 0.1
 READER = "viewer"
 """Name in the certificate of those who read everything and publish nothing."""
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -213,17 +213,21 @@ class Settings:
 
     @classmethod
     def read(cls, file: str | Path) -> Settings:
-        """``[mesh] name``, ``[network]``, ``[sensors]`` and ``[plant]`` of a configuration."""
+        """What a configuration file says."""
         path = Path(file)
         try:
-            values = tomllib.loads(path.read_text(encoding="utf-8"))
-            name, network = values["mesh"]["name"], values.get("network", {})
-        except (OSError, ValueError, KeyError, TypeError) as error:
+            return cls.of(tomllib.loads(path.read_text(encoding="utf-8")), path.parent)
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise MeshError(f"{path}: is no configuration of a mesh, which has [mesh] name: {error!r}") from None
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], folder: Path) -> Settings:
+        """``[mesh] name``, ``[network]``, ``[sensors]`` and ``[plant]`` of a configuration in a folder."""
+        name, network = values["mesh"]["name"], values.get("network", {})
         tls = network.get("tls", {})
         entry = network.get("entry", f"{'tls' if tls.get('enabled') else 'tcp'}/127.0.0.1:7447")
         tables = {"sensors": values.get("sensors", {}), "plant": values.get("plant", {})}
-        return cls(name, (entry, *network.get("connect", [])), tls=tls, folder=path.parent, **tables)
+        return cls(name, (entry, *network.get("connect", [])), tls=tls, folder=folder, **tables)
 
 
 def connect(
@@ -316,7 +320,7 @@ class Source:
         self._publishers: dict[str, Any] = {}
         self._digest, self._step = "", 0
         self._lock = threading.Lock()
-        self._outputs(mesh.model())
+        self._outputs(mesh.model())  # an error here, before anybody sees it
         self._token = session.liveliness().declare_token(mesh.key("live", name))
 
     def publish(self, values: Value | Sequence[Value] | Mapping[str, Value], time: Time = "now", **more: Any) -> None:
@@ -336,6 +340,11 @@ class Source:
         if fields is not None:
             self._put(model, self._topic, step, {("y" if self.role == "sensor" else "u"): numbers} | fields)
             self.counters["published"] += 1
+
+    @property
+    def outputs(self) -> Sequence[str]:
+        """Names of the values that it sends."""
+        return self._outputs(self._mesh.model())
 
     def _outputs(self, model: Model) -> Sequence[str]:
         if self.role == "plant":
@@ -495,7 +504,12 @@ class Mesh:
 
     def plant(self, name: str | None = None) -> Source:
         """The plant, which tells the inputs."""
-        return self._source("plant", name or str((self._settings.plant or {}).get("name", "plant")))
+        return self._source("plant", name or self.plant_name)
+
+    @property
+    def plant_name(self) -> str:
+        """The name of the plant, as the configuration says it."""
+        return str((self._settings.plant or {}).get("name", "plant"))
 
     def _source(self, role: str, name: str) -> Source:
         with self._changed:
@@ -582,7 +596,7 @@ class Mesh:
         while True:
             with self._changed:
                 if self._model is None and not self._is_closed:
-                    self._changed.wait(max(0.0, min(ASK_EVERY_S, end - clock.monotonic())))
+                    self._changed.wait(max(0.0, min(TELL_AFTER_S, end - clock.monotonic())))
                 if self._model is not None:
                     return self._model
                 if self._is_closed:
