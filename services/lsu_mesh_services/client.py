@@ -131,7 +131,8 @@ class Model:
         exact = answer.get("dt_exact")
         dt = Fraction(repr(answer["dt"])) if exact is None else Fraction(exact)
         columns = len(answer["B"][0]) if answer.get("B") else 0
-        return cls(answer["model"], dt, answer.get("start_ns"), answer["sensors"], columns, answer)
+        start, sensors = answer.get("start_ns"), answer["sensors"]
+        return cls(answer["model"], dt, start, sensors=sensors, inputs=columns, raw=answer)
 
     def time_of(self, step: int) -> int | None:
         """``t_k`` in ns; None where the mesh counts steps without times."""
@@ -692,7 +693,7 @@ class Mesh:
 
 
 def _event(name: str, raw: dict[str, Any]) -> Event:
-    return Event(raw["src"], raw["level"], raw["code"], raw["text"], raw["about"], raw)
+    return Event(source=raw["src"], **{key: raw[key] for key in ("level", "code", "text", "about")}, raw=raw)
 
 
 def span_ns(value: object) -> int:

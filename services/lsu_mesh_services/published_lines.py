@@ -85,7 +85,9 @@ class LineReader:
     def _json(self, text: str, outputs: Sequence[str]) -> Reading:
         try:
             found = json.loads(text, parse_float=Decimal, parse_constant=_no_number, object_pairs_hook=_without_copies)
-        except (json.JSONDecodeError, RecursionError):
+        except WrongValue:
+            raise
+        except (ValueError, RecursionError):
             raise WrongValue(f"{text[:80]!r} cannot be read; {EXPECTED}") from None
         if not isinstance(found, dict):
             return Reading(found)
