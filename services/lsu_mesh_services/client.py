@@ -123,6 +123,8 @@ class Model:
     start_ns: int | None
     sensors: Mapping[str, Mapping[str, Any]]
     inputs: int
+    plant: str | None
+    """Name of the plant whose inputs a program sends."""
     raw: Mapping[str, Any]
 
     @classmethod
@@ -132,7 +134,7 @@ class Model:
         dt = Fraction(repr(answer["dt"])) if exact is None else Fraction(exact)
         columns = len(answer["B"][0]) if answer.get("B") else 0
         start, sensors = answer.get("start_ns"), answer["sensors"]
-        return cls(answer["model"], dt, start, sensors=sensors, inputs=columns, raw=answer)
+        return cls(answer["model"], dt, start, sensors=sensors, inputs=columns, plant=answer.get("plant"), raw=answer)
 
     def time_of(self, step: int) -> int | None:
         """``t_k`` in ns; None where the mesh counts steps without times."""
@@ -188,7 +190,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Settings:
-    """How to reach a mesh; ``sensors`` and ``plant`` are its tables, as far as this program knows them."""
+    """How to reach a mesh."""
 
     mesh: str
     connect: Sequence[str]
@@ -197,10 +199,10 @@ class Settings:
     zenoh: Sequence[str] = ()
     tls: Mapping[str, Any] = field(default_factory=dict)
     folder: Path = Path()
-    sensors: Mapping[str, Mapping[str, Any]] | None = None
-    plant: Mapping[str, Any] | None = None
     wait: float | None = 10.0
+    """Seconds until :class:`NoMesh`; None: for ever."""
     tell: Callable[[str], None] | None = None
+    """Called with why nobody answers, and when that changes."""
 
     @property
     def uses_tls(self) -> bool:
@@ -223,12 +225,11 @@ class Settings:
 
     @classmethod
     def of(cls, values: Mapping[str, Any], folder: Path) -> Settings:
-        """``[mesh] name``, ``[network]``, ``[sensors]`` and ``[plant]`` of a configuration in a folder."""
+        """``[mesh] name`` and ``[network]`` of a configuration in a folder."""
         name, network = values["mesh"]["name"], values.get("network", {})
         tls = network.get("tls", {})
         entry = network.get("entry", f"{'tls' if tls.get('enabled') else 'tcp'}/127.0.0.1:7447")
-        tables = {"sensors": values.get("sensors", {}), "plant": values.get("plant", {})}
-        return cls(name, (entry, *network.get("connect", [])), tls=tls, folder=folder, **tables)
+        return cls(name, (entry, *network.get("connect", [])), tls=tls, folder=folder)
 
 
 def connect(
@@ -349,15 +350,17 @@ class Source:
 
     def _outputs(self, model: Model) -> Sequence[str]:
         if self.role == "plant":
-            if not model.inputs:
-                raise WrongValue(f"mesh {self._mesh.name!r}: its model has no inputs; it needs no plant")
+            if model.plant != self.name:
+                found = "none does" if model.plant is None else f"this is {model.plant!r}"
+                text = f'a program may send inputs only for a plant with source = "external"; {found}'
+                raise NotAllowed(f"mesh {self._mesh.name!r} has no such plant {self.name!r}: {text}")
             return [str(i) for i in range(model.inputs)]
         rows = model.sensors.get(self.name)
         if rows is None:
             known = ", ".join(model.sensors) or "none"
             raise WrongValue(f"mesh {self._mesh.name!r} has no sensor {self.name!r}; its sensors: {known}")
-        source = rows.get("source", self._mesh.declared(self.name).get("source"))
-        if source in ("simulated", "file"):
+        source = rows.get("source", "simulated")
+        if source != "external":
             text = 'a program may send only for a sensor with source = "external"'
             raise NotAllowed(f"[sensors.{self.name}] of mesh {self._mesh.name!r} has source = {source!r}: {text}")
         outputs: Sequence[str] = rows["outputs"]
@@ -407,9 +410,7 @@ class Source:
             self._step = step
             return {"time_ns": ns, "time_error_ns": None}, step
         self._step = max(0, model.step_within(ns))
-        declared = model.sensors[self.name].get("time_error_ns")
-        if declared is None:
-            declared = span_ns(self._mesh.declared(self.name).get("time_error", 0))
+        declared = model.sensors[self.name].get("time_error_ns", 0)
         given = max(time_error_ns, math.ceil(_exact_ns(time_error)[0]))
         if given < 0:
             raise WrongValue(f"time_error = {time_error!r}: expected 0 or more seconds")
@@ -505,12 +506,7 @@ class Mesh:
 
     def plant(self, name: str | None = None) -> Source:
         """The plant, which tells the inputs."""
-        return self._source("plant", name or self.plant_name)
-
-    @property
-    def plant_name(self) -> str:
-        """The name of the plant, as the configuration says it."""
-        return str((self._settings.plant or {}).get("name", "plant"))
+        return self._source("plant", name or self.model().plant or "plant")
 
     def _source(self, role: str, name: str) -> Source:
         with self._changed:
@@ -572,11 +568,6 @@ class Mesh:
     def key(self, topic: str, name: str) -> str:
         """The key of a topic of a peer."""
         return f"lsu/v1/{self.name}/{topic}/{name}"
-
-    def declared(self, sensor: str) -> Mapping[str, Any]:
-        """The table of a sensor in the configuration, with its source where that is the usual one."""
-        table = None if self._settings.sensors is None else self._settings.sensors.get(sensor)
-        return {} if table is None else {"source": "file" if "file" in table else "simulated"} | dict(table)
 
     def declare_publisher(self, session: Any, key: str) -> Any:
         """A publisher whose messages late subscribers get too."""
@@ -694,15 +685,6 @@ class Mesh:
 
 def _event(name: str, raw: dict[str, Any]) -> Event:
     return Event(source=raw["src"], **{key: raw[key] for key in ("level", "code", "text", "about")}, raw=raw)
-
-
-def span_ns(value: object) -> int:
-    """A span of a configuration, such as ``"5ms"`` or seconds, in ns, rounded up."""
-    units = {"ns": 1, "us": 10**3, "ms": 10**6, "s": NS, "min": 60 * NS, "": NS}
-    found = re.fullmatch(r"([0-9.]+)\s*(ns|us|ms|s|min|)", str(value).strip())
-    if found is None:
-        raise MeshError(f'time_error = {value!r} is no span; expected one such as "5ms"')
-    return math.ceil(Fraction(found[1]) * units[found[2]])
 
 
 def _found_at(endpoint: str) -> str:

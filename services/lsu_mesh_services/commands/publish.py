@@ -17,6 +17,8 @@ from lsu_mesh_services.published_lines import LineReader, Reading
 
 MAX_WAITING = 65536
 """Lines that may wait for the mesh; of more the newest are kept."""
+MAX_AGE_S = 5.0
+"""Lines that came so long before the mesh are dropped: it would refuse them as of the past."""
 STAY_S = 1.0
 """A program that prints one line and ends stays so long, so that every filter gets it."""
 BURST, BURST_NS = 8, 1_000_000
@@ -90,14 +92,17 @@ def _read(lines: Stream[Line]) -> None:
 
 def _publish(mesh: Mesh, lines: Stream[Line], options: argparse.Namespace) -> int:
     wrong = sent = 0
-    is_plant = options.plant or options.name == mesh.plant_name
+    is_plant = options.plant or options.name == mesh.model().plant
     source = mesh.plant(options.name) if is_plant else mesh.sensor(options.name)
     print(f"publish: {source.role} {options.name} is on the mesh {mesh.name!r}", file=sys.stderr)
-    began = time.monotonic()
+    began, oldest_ns, dropped = time.monotonic(), time.time_ns() - int(MAX_AGE_S * 1e9), 0
     reader = LineReader("u" if is_plant else "y")
     bursts = _Bursts()
     try:
         for line in lines:
+            if line.time_ns < oldest_ns:
+                dropped += 1
+                continue
             try:
                 for reading in reader.readings(line.text, source.outputs):
                     _send(source, reading, line)
@@ -109,10 +114,10 @@ def _publish(mesh: Mesh, lines: Stream[Line], options: argparse.Namespace) -> in
         time.sleep(max(0.0, began + STAY_S - time.monotonic()) if sent else 0.0)
     except KeyboardInterrupt:
         pass  # the usual way to end it
-    if lines.dropped:
-        print(f"publish: {lines.dropped} line(s) came before the mesh, and were dropped", file=sys.stderr)
+    if dropped := dropped + lines.dropped:
+        print(f"publish: {dropped} line(s) came long before the mesh, and were dropped", file=sys.stderr)
     print(f"publish: {sent} sent" + (f", {wrong} line(s) not: see above" if wrong else ""), file=sys.stderr)
-    return FAILURE if wrong or lines.dropped else OK
+    return FAILURE if wrong or dropped else OK
 
 
 def _send(source: Source, reading: Reading, line: Line) -> None:
