@@ -40,7 +40,7 @@ Time = datetime | str | Decimal | Fraction | int | float
 Value = float | int | Decimal | Fraction | None
 NS, MAX_NS = 10**9, 2**63
 LEASE_MS, HEARTBEAT_S, LEAST_CACHED, CACHED_S = 2000, 0.1, 256, 6
-ASK_EVERY_S, ANSWER_S, TELL_AFTER_S, SILENT_S, LOOK_EVERY_S = 1.0, 0.9, 0.5, 3.0, 0.1
+ASK_EVERY_S, ANSWER_S, TELL_AFTER_S, SILENT_S, LOOK_EVERY_S = 1.0, 0.9, 0.3, 3.0, 0.1
 READER = "viewer"
 """Name in the certificate of those who read everything and publish nothing."""
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -106,6 +106,8 @@ def _read_text(text: str) -> Fraction:
             if zone is None:
                 raise WrongValue(f"time {text!r} has no time zone; end it with Z or +02:00")
             return _exact_ns(datetime.fromisoformat(whole + zone))[0] + Fraction(f"0.{digits or 0}") * NS
+        if "_" in words:
+            raise ValueError
         return Fraction(Decimal(words)) * NS
     except (ValueError, OverflowError, InvalidOperation) as error:
         if isinstance(error, WrongValue):
