@@ -102,7 +102,7 @@ def test_what_is_no_time_is_refused_with_the_remedy(wrong: Any, remedy: str) -> 
 
 
 @given(
-    st.integers(0, 2 * 10**18), st.fractions(min_value=Fraction(1, 10**6), max_value=100, max_denominator=1000),
+    st.integers(0, 2 * 10**18), st.fractions(min_value=Fraction(1, 1000), max_value=100, max_denominator=1000),
     st.integers(-5, 10**6), st.integers(-2, 2),
 )  # fmt: skip
 def test_an_input_is_of_the_step_in_which_it_begins(start: int, dt: Fraction, k: int, off: int) -> None:
