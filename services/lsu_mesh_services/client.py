@@ -585,7 +585,7 @@ class Mesh:
 
         Raises :class:`NoMesh` after ``wait`` seconds; the text says who was asked, and what was found there.
         """
-        told, wait = "", self._settings.wait
+        told, words, wait = "", "", self._settings.wait
         end = math.inf if wait is None else clock.monotonic() + wait
         while True:
             with self._changed:
@@ -597,8 +597,9 @@ class Mesh:
                     raise NoMesh(f"mesh {self.name!r}: this program has left it")
             if clock.monotonic() >= end:
                 raise NoMesh(self.why_silent())
-            if self._settings.tell is not None and (words := self.why_silent()) != told:
-                self._settings.tell(words)
+            words, before = "" if self._settings.tell is None else self.why_silent(), words
+            if words != told and self._settings.tell is not None and (words == before or not told):
+                self._settings.tell(words)  # what lasts: while a mesh starts, the reason changes all the time
                 told = words
 
     def links(self) -> int:

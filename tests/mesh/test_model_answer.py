@@ -67,7 +67,8 @@ def test_what_a_program_may_send_is_told(tmp_path: Path) -> None:
     file = tmp_path / "mesh.toml"
     file.write_text(
         '[mesh]\nname = "live"\ndt = "1/30"\n[model]\ncontinuous = true\nA = [[-1.0]]\nB = [[2.0]]\nrho = [0.1]\n'
-        '[model.prior]\nlower = [0.0]\nupper = [1.0]\n[model.input_box]\nlower = [0.0]\nupper = [1.0]\n[plant]\nname = "arm"\nsource = "external"\n'
+        "[model.prior]\nlower = [0.0]\nupper = [1.0]\n"
+        '[model.input_box]\nlower = [0.0]\nupper = [1.0]\n[plant]\nname = "arm"\nsource = "external"\n'
         '[sensors.s]\nC = [[1.0]]\nr = [0.1]\nsource = "external"\n[filters.f]\nkind = "LSUO"\nsensors = ["s"]\n'
     )
     told = msgpack.unpackb(encode_model(model_answer(load(file))))
