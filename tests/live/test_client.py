@@ -158,7 +158,9 @@ def test_who_is_no_external_sensor_is_told(start: Start, mesh_file: Path) -> Non
 def test_another_mesh_at_the_entry_is_named(start: Start, mesh_file: Path) -> None:
     run(start, mesh_file)
     entry = next(line.split('"')[1] for line in mesh_file.read_text().splitlines() if line.startswith("entry"))
-    told: list[str] = []
-    with connect(name="lab", entry=entry, tell=told.append) as mesh, pytest.raises(NoMesh, match="nobody answers"):
+    with connect(mesh_file, wait=2 * WITHIN) as mesh:
         mesh.model()
-    assert any("peers of 'external' are there" in words and "not 'lab'" in words for words in told), told
+        with connect(name="lab", entry=entry, wait=3.0) as other, pytest.raises(NoMesh) as silence:
+            other.model()
+    assert "peers of 'external' are there, but nobody answers lsu/v1/lab/model" in str(silence.value)
+    assert "not 'lab'" in str(silence.value)
