@@ -41,6 +41,7 @@ Value = float | int | Decimal | Fraction | None
 NS, MAX_NS = 10**9, 2**63
 LEASE_MS, HEARTBEAT_S, LEAST_CACHED, CACHED_S = 2000, 0.1, 256, 6
 ASK_EVERY_S, ANSWER_S, TELL_AFTER_S, SILENT_S, LOOK_EVERY_S = 1.0, 0.9, 0.3, 3.0, 0.1
+SETTLED_S, SETTLE_S = 0.3, 2.0
 READER = "viewer"
 """Name in the certificate of those who read everything and publish nothing."""
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -502,6 +503,8 @@ class Mesh:
     def sensor(self, name: str) -> Source:
         """The sensor of that name, which this process is from now on: it is seen in ``lsu-mesh health``.
 
+        It returns when somebody listens and the links have settled, or after two seconds.
+
         Raises :class:`NoMesh`, :class:`NotAllowed`, and :class:`WrongValue` where the mesh has no such sensor.
         """
         return self._source("sensor", name)
@@ -512,9 +515,25 @@ class Mesh:
 
     def _source(self, role: str, name: str) -> Source:
         with self._changed:
-            if (role, name) not in self._sources:
-                self._sources[role, name] = Source(self, self._session(name), role, name=name)
-            return self._sources[role, name]
+            known = self._sources.get((role, name))
+            if known is not None:
+                return known
+            session = self._session(name)
+            source = self._sources[role, name] = Source(self, session, role, name=name)
+        self._settle(session, self.key("measurement" if role == "sensor" else "input", name))
+        return source
+
+    def _settle(self, session: Any, key: str) -> None:
+        """Wait for the links, a moment: filters take no live data from caches, so what is sent before is lost."""
+        probe, links, since = session.declare_publisher(key), -1, clock.monotonic()
+        end = since + SETTLE_S
+        while (now := clock.monotonic()) < end:
+            if (linked := self.links()) != links:
+                links, since = linked, now
+            if now > since + SETTLED_S and probe.matching_status.matching:
+                break
+            clock.sleep(0.02)
+        probe.undeclare()
 
     def estimates(self, name: str, *, history: int = 1, keep: int = 1024) -> Stream[Estimate]:
         """What the filter or fusion of that name publishes, from its last ``history`` estimates on."""
@@ -598,9 +617,10 @@ class Mesh:
             if clock.monotonic() >= end:
                 raise NoMesh(self.why_silent())
             words, before = "" if self._settings.tell is None else self.why_silent(), words
-            if words != told and self._settings.tell is not None and (words == before or not told):
+            reason = re.sub(r"\d", "", words)
+            if reason != told and self._settings.tell is not None and (words == before or not told):
                 self._settings.tell(words)  # what lasts: while a mesh starts, the reason changes all the time
-                told = words
+                told = reason
 
     def links(self) -> int:
         """How many peers and routers this program is connected to."""

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lsu_mesh_services.client import Estimate, Mesh, NoMesh, Source, Stream, connect
+from lsu_mesh_services.client import Estimate, Mesh, NoMesh, NotAllowed, Source, Stream, connect
+from lsu_mesh_services.network.certificate_authority import Authority
 from ports import free_port
 from waiting import WITHIN
 
@@ -164,3 +165,25 @@ def test_another_mesh_at_the_entry_is_named(start: Start, mesh_file: Path) -> No
             other.model()
     assert "peers of 'external' are there, but nobody answers lsu/v1/lab/model" in str(silence.value)
     assert "not 'lab'" in str(silence.value)
+
+
+def test_a_mesh_with_certificates_takes_the_sensor_and_tells_who_may_not(start: Start, mesh_file: Path) -> None:
+    text = mesh_file.read_text().replace("tcp/", "tls/")
+    mesh_file.write_text(f"{text}[network.tls]\nenabled = true\n")
+    assert start("keys", "init", str(mesh_file)).wait() == 0
+    run(start, mesh_file)
+    keys = mesh_file.parent / "keys"
+    with connect(mesh_file, wait=2 * WITHIN) as mesh:
+        gauge, estimates = mesh.sensor("gauge"), mesh.estimates("main")
+        with sending(gauge):
+            good(estimates, 10)
+    with connect(mesh_file, wait=3.0) as mesh:
+        (keys / "gauge.pem").write_bytes((keys / "main.pem").read_bytes())
+        with pytest.raises(NotAllowed, match="certificate of 'main', which may publish as 'main' and nobody else"):
+            mesh.sensor("gauge")
+    stranger = Authority.new("external", 2, keys / "other.pem", keys / "other.key")
+    for ending in ("pem", "key"):
+        (keys / f"gauge.{ending}").unlink()
+    stranger.issue("gauge", ("localhost", "127.0.0.1"), 2, keys / "gauge.pem", keys / "gauge.key")
+    with connect(mesh_file, wait=3.0) as mesh, pytest.raises(NoMesh, match="it refuses this certificate"):
+        mesh.sensor("gauge")
