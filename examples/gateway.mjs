@@ -1,5 +1,5 @@
 // A sensor and a reader in JavaScript, over `lsu-mesh gateway --http 127.0.0.1:8080`: no package is needed.
-// In a browser, or with Node 18 or newer:  node gateway.js http://127.0.0.1:8080 gauge main TOKEN
+// In a browser, or with Node 18 or newer:  node gateway.mjs http://127.0.0.1:8080 gauge main TOKEN
 // Times of 64 bits are strings of digits, because a JavaScript number would lose their last digits.
 
 export async function publish(base, sensor, token, y, time = "now") {

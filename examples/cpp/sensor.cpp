@@ -1,4 +1,4 @@
-// A sensor of one output in C++: sensor ENDPOINT MESH NAME; each line of input is a number. See README.md.
+// A sensor of one output in C++: sensor ENDPOINT MESH NAME; each line of input is a number. See docs/your-own-sensors.md.
 #include <chrono>
 #include <cstdio>
 #include <iostream>

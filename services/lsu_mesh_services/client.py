@@ -604,7 +604,7 @@ class Mesh:
 
         Raises :class:`NoMesh` after ``wait`` seconds; the text says who was asked, and what was found there.
         """
-        told, words, wait = "", "", self._settings.wait
+        told, reason, wait = "", "", self._settings.wait
         end = math.inf if wait is None else clock.monotonic() + wait
         while True:
             with self._changed:
@@ -616,11 +616,12 @@ class Mesh:
                     raise NoMesh(f"mesh {self.name!r}: this program has left it")
             if clock.monotonic() >= end:
                 raise NoMesh(self.why_silent())
-            words, before = "" if self._settings.tell is None else self.why_silent(), words
-            reason = re.sub(r"\d", "", words)
-            if reason != told and self._settings.tell is not None and (words == before or not told):
-                self._settings.tell(words)  # what lasts: while a mesh starts, the reason changes all the time
-                told = reason
+            if self._settings.tell is not None:
+                words = self.why_silent()
+                reason, before = re.sub(r"\d", "", words), reason
+                if reason != told and (before == reason or not self.links()):
+                    self._settings.tell(words)  # of a mesh that starts, what lasts
+                    told = reason
 
     def links(self) -> int:
         """How many peers and routers this program is connected to."""
