@@ -21,8 +21,6 @@ MAX_AGE_S = 5.0
 """Lines that came so long before the mesh are dropped: it would refuse them as of the past."""
 STAY_S = 1.0
 """A program that prints one line and ends stays so long, so that every filter gets it."""
-BURST, BURST_NS = 8, 1_000_000
-"""So many lines without a time within so long were not measured when they came."""
 
 
 class Line(NamedTuple):
@@ -97,7 +95,6 @@ def _publish(mesh: Mesh, lines: Stream[Line], options: argparse.Namespace) -> in
     print(f"publish: {source.role} {options.name} is on the mesh {mesh.name!r}", file=sys.stderr)
     began, oldest_ns, dropped = time.monotonic(), time.time_ns() - int(MAX_AGE_S * 1e9), 0
     reader = LineReader("u" if is_plant else "y")
-    bursts = _Bursts()
     try:
         for line in lines:
             if line.time_ns < oldest_ns:
@@ -107,7 +104,6 @@ def _publish(mesh: Mesh, lines: Stream[Line], options: argparse.Namespace) -> in
                 for reading in reader.readings(line.text, source.outputs):
                     _send(source, reading, line)
                     sent += 1
-                    bursts.record(reading, line)
             except WrongValue as error:
                 wrong += 1
                 print(f"publish: line {line.number}: {error}", file=sys.stderr)
@@ -125,24 +121,3 @@ def _send(source: Source, reading: Reading, line: Line) -> None:
     if reading.time is None and "time_ns" not in more:
         more["time_ns"] = line.time_ns
     source.publish(reading.values, "now" if reading.time is None else reading.time, **more)
-
-
-class _Bursts:
-    """Tells once where lines without times come at once: a program that buffers its output makes false times."""
-
-    def __init__(self) -> None:
-        self._times: list[int] = []
-        self._is_told = False
-
-    def record(self, reading: Reading, line: Line) -> None:
-        """A reading was sent."""
-        if self._is_told or reading.time is not None or reading.more:
-            return
-        self._times = [*self._times[-BURST + 1 :], line.time_ns]
-        if len(self._times) == BURST and self._times[-1] - self._times[0] < BURST_NS:
-            self._is_told = True
-            text = (
-                f"{BURST} lines without a time came within {BURST_NS / 1e6:g} ms: were they measured then? A program "
-                "that buffers its output makes false times: fflush() in awk, stdbuf -oL, or a time in each line"
-            )
-            print(f"publish: line {line.number}: {text}", file=sys.stderr)
