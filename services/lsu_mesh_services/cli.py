@@ -19,6 +19,7 @@ from lsu_mesh_services.options import (
     keys,
     new,
     peer,
+    publish,
     recording,
     replay,
     reproduce,
@@ -34,6 +35,7 @@ from lsu_mesh_services.stop import Stop, leave
 GROUPS = (
     run,
     peer,
+    publish,
     new,
     validate,
     doctor,
