@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection
 
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.duplicate_publishers import DuplicatePublishers
 from lsu_mesh.mesh.input_time import check_beginning
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.measurement_time import is_timed, placed
@@ -42,6 +43,7 @@ WINDOW = 4096
 """How far back in a sequence a message may come late and still be told from a copy."""
 MAX_BOOTS = 16
 UNLIMITED = 4096
+DUPLICATE_PUBLISHER = "duplicate publisher"
 MAX_NAMES = 64
 """So many unknown fields are counted by name; whoever sends more of them is counted without."""
 
@@ -69,6 +71,10 @@ class Sequence:
             self._unseen.remove(seq)
             return True
         return False
+
+    def want(self, numbers: Collection[int]) -> None:
+        """Numbers that have come and were not used are missing again."""
+        self._gaps.update(number for number in numbers if self._newest - WINDOW <= number <= self._newest)
 
     @property
     def gaps(self) -> int:
@@ -115,17 +121,21 @@ class Admission:
         """By topic and field, such as ``posterior.support.colour``."""
         self.decoder: Callable[[str, bytes], tuple[Message, tuple[str, ...]]] = read
         """What makes messages of payloads; many receivers in one process may share one with a memory."""
+        self.publishers: DuplicatePublishers | None = None
+        """Which of two living processes of one key is refused; None: what all of them send is let in."""
+        self.datum_refused: Callable[[str, str, float], None] | None = None
+        """Told of each datum refused for its time: source, reason, and seconds that it is late (below 0: early)."""
 
-    def admit(self, key: str, payload: bytes) -> Message | None:
-        """The message, or ``None`` when it is refused or a copy."""
+    def admit(self, key: str, payload: bytes, now: int | None = None) -> Message | None:
+        """The message, or ``None`` when it is refused or a copy; ``now`` is when it came, None where nobody knows."""
         try:
             message, unknown = self._checked(key, payload)
+            if not self._is_new(key, message):
+                self.duplicates += 1
+                return None
+            self._check_publisher(key, message, now)
         except Refused as refusal:
-            self.refused[refusal.reason] += 1
-            self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
-            return None
-        if not self._is_new(key, message):
-            self.duplicates += 1
+            self._refuse(key, refusal)
             return None
         self.received += 1
         if unknown:
@@ -158,6 +168,22 @@ class Admission:
             counts["unknown fields"] = self.with_unknown_fields
             counts |= {f"unknown fields.{name}": count for name, count in sorted(self.unknown_fields.items())}
         return counts
+
+    def _refuse(self, key: str, refusal: Refused) -> None:
+        self.refused[refusal.reason] += 1
+        self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
+        if refusal.seconds is not None and self.datum_refused is not None:
+            self.datum_refused(refusal.source, refusal.reason, refusal.seconds)
+
+    def _check_publisher(self, key: str, message: Message, now: int | None) -> None:
+        """Refuse what a second living process sends; what was refused when the first was gone already is asked for."""
+        if self.publishers is None or now is None:
+            return
+        pair = self.publishers.refuses(key, message, now)
+        for address, boot, numbers in self.publishers.take_missed():
+            self._sequences[address, boot].want(numbers)
+        if pair is not None:
+            raise Refused(DUPLICATE_PUBLISHER, pair.words)
 
     def _count_unknown(self, topic: str, fields: tuple[str, ...]) -> None:
         self.with_unknown_fields += 1

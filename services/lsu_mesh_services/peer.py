@@ -8,8 +8,9 @@ import sys
 from collections.abc import Iterable
 from dataclasses import replace
 
+from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
-from lsu_mesh.mesh.messages import Message, encode, encoding
+from lsu_mesh.mesh.messages import Event, Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
@@ -69,6 +70,7 @@ class Peer:
             self._bus.announce(key(self._mesh, topic, self._node.name))
         for topic, name in self._node.subscriptions():
             self._bus.subscribe(key(self._mesh, topic, name))
+        self._bus.subscribe_live(key(self._mesh, "health", self._node.name))  # another process of the own name
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", self._node.name))
         if isinstance(self._node, FilterNode):
@@ -153,11 +155,8 @@ class Peer:
         if arrival.what == "sample":
             return self._node.deliver(self._canonical(arrival.key), arrival.payload, arrival.arrival_ns)
         address = parse(arrival.key)
-        if address is not None and isinstance(self._node, Estimator) and address.name in self._node.sources:
-            if arrival.what == "gone":
-                self._node.absent.add(address.name)
-            else:
-                self._node.absent.discard(address.name)
+        if address is not None:
+            self._node.record_alive(address.name, arrival.what == "alive", arrival.arrival_ns)
         return []
 
     def _canonical(self, sample_key: str) -> str:
@@ -168,4 +167,6 @@ class Peer:
 
     def _publish(self, messages: Iterable[Message]) -> None:
         for message in messages:
+            if isinstance(message, Event) and message.code == DUPLICATE_PROCESS:
+                print(f"{self._node.role} {self._node.name}: {message.text}", file=sys.stderr)
             self._bus.publish(self._node.key(message), encode(message), encoding(message.topic))

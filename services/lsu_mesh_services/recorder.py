@@ -12,6 +12,7 @@ from pathlib import Path
 
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.duplicate_process import DuplicateProcess
 from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
@@ -92,6 +93,7 @@ class RecorderService:
         self._links = -1
         self._queue = self._longest_ns = 0
         """The longest queue and turn since the last health message."""
+        self._other_process = DuplicateProcess(f"{ROLE_NAME}/{ROLE_NAME}", self._boot)
         self._roles = {name: role for role, name in configuration.peers()}
         others = [name for name in self._roles if name != ROLE_NAME]
         self._source_timeouts = SourceTimeouts(configuration, [("health", name) for name in others], others)
@@ -148,6 +150,8 @@ class RecorderService:
                 self._recorder.record(arrival.key, arrival.payload, arrival.arrival_ns, message)
             if isinstance(message, Health) and message.name != ROLE_NAME:
                 self._source_timeouts.received(message.name, arrival.arrival_ns)
+            elif isinstance(message, Health):
+                self._other_process.record(message, self._started_ns, arrival.arrival_ns)
             return
         address = parse(arrival.key)
         if address is not None:
@@ -156,6 +160,10 @@ class RecorderService:
 
     def _tell_health(self, now: int) -> None:
         problems = list(self._recorder.problems)
+        twice = self._other_process.complaint(now)
+        problems += [] if twice is None else [twice]
+        if self._other_process.take_news(now) is not None:
+            print(f"{ROLE_NAME}: {twice}", file=sys.stderr)
         problems += [complaint.text for complaint in self._source_timeouts.complaints(now)]
         if self._bus.dropped:
             problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")

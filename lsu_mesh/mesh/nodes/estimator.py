@@ -21,9 +21,9 @@ from lsu_mesh.mesh.estimation.step_record import Combined, Step, published_conte
 from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.warm_up import warm_up
 from lsu_mesh.mesh.messages import Bounds, Input, Measurement, Message, Posterior, SupportMessage
-from lsu_mesh.mesh.nodes.node import Complaint
+from lsu_mesh.mesh.nodes.node import About, Complaint
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key
-from lsu_mesh.mesh.nodes.starting import START_GRACE, About, StartingNode
+from lsu_mesh.mesh.nodes.starting import START_GRACE, StartingNode
 from lsu_mesh.mesh.sets import to_message
 
 __all__ = ["START_GRACE", "Estimator"]
@@ -93,6 +93,12 @@ class Estimator(StartingNode):
         return []
 
     # -- messages in
+
+    def record_alive(self, name: str, is_there: bool, now: int) -> None:
+        """Whoever has left is not waited for."""
+        super().record_alive(name, is_there, now)
+        if name in self.sources:
+            (self.absent.discard if is_there else self.absent.add)(name)
 
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""

@@ -37,9 +37,8 @@ from lsu_mesh.mesh.messages import (
 )
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter_events import dropped_event, rejected_event, widened_event
-from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.nodes.node import SECOND, About
 from lsu_mesh.mesh.nodes.source_timeout import input_key
-from lsu_mesh.mesh.nodes.starting import About
 from lsu_mesh.mesh.sets import to_message
 
 

@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
@@ -69,7 +70,8 @@ def print_json(peers: Sequence[PeerHealth]) -> None:
     for peer in peers:
         about = {"name": peer.name, "role": peer.role, "level": peer.level, "reasons": list(peer.reasons)}
         age = None if peer.age_ns is None else peer.age_ns / SECOND
-        more = {"counters": dict(peer.counters), "started_ns": peer.started_ns, "host": peer.host}
+        more: dict[str, object] = {"counters": dict(peer.counters), "started_ns": peer.started_ns, "host": peer.host}
+        more["processes"] = [asdict(process) for process in peer.processes]
         print(json.dumps(about | {"step": peer.step, "age_s": age} | more))
 
 
