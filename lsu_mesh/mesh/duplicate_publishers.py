@@ -25,6 +25,8 @@ MAX_BOOTS = 8
 """Of one key."""
 GAPS = 9
 """The usual gap is the median of so many."""
+LEAST_GAPS = 3
+"""So many are known of whoever has a habit."""
 MAX_NEWS = 64
 
 
@@ -51,7 +53,9 @@ class _Publisher:
 
     def __init__(self, message: Message, now: int, kept: int) -> None:
         self.boot, self.src, self.name = message.boot, message.src, message.name
-        self.first_sent_ns = self.newest_sent_ns = message.sent_ns
+        self.first_sent_ns: int | None = message.sent_ns
+        """None before its first message after it was away."""
+        self.newest_sent_ns = message.sent_ns
         self.newest_seq = message.seq
         self.seen_at = now
         """When it last sent something new."""
@@ -65,15 +69,19 @@ class _Publisher:
         """Sequence number and arrival of what was refused last."""
         self._gaps: deque[int] = deque(maxlen=GAPS)
 
-    def is_fresh(self, message: Message, now: int) -> bool:
-        """Whether a message is newer than all before it; it is noted."""
-        if message.seq <= self.newest_seq:
-            return False
+    def take(self, message: Message, now: int) -> None:
+        """Note something new."""
+        if self.first_sent_ns is None:
+            self.first_sent_ns = message.sent_ns
         gap = (message.sent_ns - self.newest_sent_ns) // (message.seq - self.newest_seq)
         self._gaps.append(max(0, gap))
         self.newest_seq, self.newest_sent_ns = message.seq, message.sent_ns
         self.seen_at = max(self.seen_at, now)
-        return True
+
+    @property
+    def has_habit(self) -> bool:
+        """Whether its usual gap is known."""
+        return len(self._gaps) >= LEAST_GAPS
 
     def is_present(self, now: int, gone_at: int | None) -> bool:
         """Whether it may still be there, by its own habit; after its token went, a message must have come since."""
@@ -84,7 +92,7 @@ class _Publisher:
 
     def sent(self, message: Message, earlier: _Publisher) -> None:
         """Note something new of this one, the later of two."""
-        if message.sent_ns > earlier.first_sent_ns:
+        if earlier.first_sent_ns is not None and message.sent_ns > earlier.first_sent_ns:
             self.sent_beside.setdefault(earlier.boot, message.sent_ns)
 
     def is_proved_by(self, message: Message, now: int) -> bool:
@@ -97,6 +105,18 @@ class _Publisher:
             return True
         heard = self.heard_beside.setdefault(message.boot, now)
         return min(now, self.seen_at) - heard >= PROOF_NS
+
+    def come_back(self) -> None:
+        """Begin anew, as one that was just started."""
+        self.first_sent_ns = None
+        self.forget_all_but(set())
+        self.refused.clear()
+
+    def forget(self, boot: str) -> None:
+        """Nothing of another boot matters any more."""
+        self.rivals.discard(boot)
+        self.sent_beside.pop(boot, None)
+        self.heard_beside.pop(boot, None)
 
     def forget_all_but(self, boots: set[str]) -> None:
         """Nothing of other boots matters any more."""
@@ -133,11 +153,14 @@ class DuplicatePublishers:
         known = self._known.setdefault(key, [])
         publisher = next((one for one in known if one.boot == message.boot), None)
         if publisher is None:
-            self._forget_absent(known, now)
+            self._make_room(known)
             publisher = _Publisher(message, now, self._kept)
             known.append(publisher)
             self._compare(key, publisher, message, now=now)
-        elif publisher.is_fresh(message, now):
+        elif message.seq > publisher.newest_seq:
+            if len(known) > 1:
+                self._return(known, publisher, now)
+            publisher.take(message, now)
             self._compare(key, publisher, message, now=now)
         return self._refused(key, publisher, message, now=now) if publisher.rivals else None
 
@@ -203,14 +226,23 @@ class DuplicatePublishers:
         if numbers:
             self._missed.append((key, publisher.boot, numbers))
 
-    def _forget_absent(self, known: list[_Publisher], now: int) -> None:
-        """Before a new boot is added: those that are gone, and the one silent for the longest where there are many."""
-        rivals = {boot for one in known for boot in one.rivals}
-        known[:] = [one for one in known if one.boot in rivals or one.is_present(now, self._gone_at.get(one.name))]
+    def _make_room(self, known: list[_Publisher]) -> None:
+        """Before a new boot is added: forget the one that is silent for the longest where there are many."""
         if len(known) >= MAX_BOOTS:
             known.remove(min(known, key=lambda one: one.seen_at))
         for one in known:
             one.forget_all_but({other.boot for other in known})
+
+    def _return(self, known: list[_Publisher], publisher: _Publisher, now: int) -> None:
+        """One that was away for long, and comes back beside another one, is the later of the two."""
+        gone_at = self._gone_at.get(publisher.name)
+        was_away = publisher.has_habit and not publisher.is_present(now, gone_at)
+        if was_away and any(one.is_present(now, gone_at) for one in known if one is not publisher):
+            known.remove(publisher)
+            for one in known:
+                one.forget(publisher.boot)
+            publisher.come_back()
+            known.append(publisher)
 
 
 def _pair(key: str, earlier: _Publisher, later: _Publisher) -> DuplicatePublisher:
