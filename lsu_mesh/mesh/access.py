@@ -30,7 +30,7 @@ class Access(NamedTuple):
 
 def truth_is_known(configuration: Configuration) -> bool:
     """Whether the plant tells its state: a sensor is simulated on it. Real measurements come without a truth."""
-    return configuration.plant is not None and any(one.file is None for one in configuration.sensors.values())
+    return configuration.plant is not None and any(one.is_simulated for one in configuration.sensors.values())
 
 
 def published_topics(configuration: Configuration, role: str, name: str) -> tuple[str, ...]:
@@ -42,7 +42,7 @@ def published_topics(configuration: Configuration, role: str, name: str) -> tupl
 def subscriptions(configuration: Configuration, role: str, name: str) -> list[tuple[str, str]]:
     """``(topic, name)`` of everything that a node listens to."""
     if role == "sensor":
-        return _truth(configuration) if configuration.sensors[name].file is None else []
+        return _truth(configuration) if configuration.sensors[name].is_simulated else []
     if role == "filter":
         return _of_filter(configuration, name)
     if role == "identifier":

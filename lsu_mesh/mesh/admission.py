@@ -10,6 +10,7 @@ from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.duplicate_publishers import DuplicatePublishers
 from lsu_mesh.mesh.input_time import check_beginning
 from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.live_times import check_live_time
 from lsu_mesh.mesh.measurement_time import is_timed, placed
 from lsu_mesh.mesh.messages import (
     ConstrainedZonotopeMessage,
@@ -55,9 +56,17 @@ class Sequence:
         self._newest = first - 1
         self._unseen = set(range(max(0, first - WINDOW), first))
         self._gaps: set[int] = set()
+        self._newest_sent = 0
+        """When the newest message was sent."""
 
-    def admit(self, seq: int) -> bool:
-        """Whether ``seq`` is new."""
+    def admit(self, seq: int, sent_ns: int = 0) -> bool:
+        """Whether ``seq`` is new.
+
+        Raises :class:`Refused` where it has come before in a message that was sent earlier: this is another message.
+        """
+        if seq <= self._newest and sent_ns > self._newest_sent and not (seq in self._gaps or seq in self._unseen):
+            raise Refused("sequence", f"number {seq} came before; draw a new boot at each start, or count on")
+        self._newest_sent = max(self._newest_sent, sent_ns)
         if seq > self._newest:
             self._gaps.update(range(max(self._newest + 1, seq - WINDOW), seq))
             self._newest = seq
@@ -127,9 +136,13 @@ class Admission:
         """Told of each datum refused for its time: source, reason, and seconds that it is late (below 0: early)."""
 
     def admit(self, key: str, payload: bytes, now: int | None = None) -> Message | None:
-        """The message, or ``None`` when it is refused or a copy; ``now`` is when it came, None where nobody knows."""
+        """The message, or ``None`` when it is refused or a copy.
+
+        ``now``: the receiver's clock in ns since 1970 when it came, by which times of live sources are judged, and
+        whether another process lives; None: they are not.
+        """
         try:
-            message, unknown = self._checked(key, payload)
+            message, unknown = self._checked(key, payload, now)
             if not self._is_new(key, message):
                 self.duplicates += 1
                 return None
@@ -191,7 +204,7 @@ class Admission:
             if name in self.unknown_fields or len(self.unknown_fields) < MAX_NAMES:
                 self.unknown_fields[name] += 1
 
-    def _checked(self, key: str, payload: bytes) -> tuple[Message, tuple[str, ...]]:
+    def _checked(self, key: str, payload: bytes, now: int | None) -> tuple[Message, tuple[str, ...]]:
         address = parse(key)
         if address is None or address.mesh != self._mesh or address.topic not in self._topics:
             raise Refused("key", "not a key that this peer listens to")
@@ -203,6 +216,8 @@ class Admission:
             raise Refused("unknown", f"the configuration has no {role} {address.name!r}")
         if message.model != self._digest:
             raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
+        if now is not None and isinstance(message, Measurement | Input):
+            check_live_time(self._configuration, message, now)
         self._check_shape(address.name, message)
         if isinstance(message, Measurement):
             message = placed(self._configuration, message)
@@ -248,7 +263,7 @@ class Admission:
         if sequence is None:
             self._forget_old_boots(key)
             sequence = self._sequences[identity] = Sequence(message.seq)
-        return sequence.admit(message.seq)
+        return sequence.admit(message.seq, message.sent_ns)
 
     def _forget_old_boots(self, key: str) -> None:
         known = [identity for identity in self._sequences if identity[0] == key]

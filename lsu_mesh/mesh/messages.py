@@ -199,6 +199,8 @@ class Measurement(Message, frozen=True, kw_only=True):
     """Measured outputs of one sensor; nil is a missing entry."""
 
     topic = "measurement"
+    step: Count = 0
+    """k; 0, or nothing: the mesh puts it on the step of its time."""
     y: Annotated[list[float | None], Meta(max_length=4096)]
     time_ns: Count
     time_error_ns: Count | None = None

@@ -68,12 +68,18 @@ def _of_sensor(sensor: SensorSettings) -> Iterator[tuple[str, Rows]]:
 def depends_on_time(configuration: Configuration) -> bool:
     """Whether dt and the start are part of the mathematics, so that peers of another grid are other peers.
 
-    They are where the model is continuous, where it changes at a step, and where a sensor's data may lie off the grid.
+    They are where the model is continuous, where it changes at a step, where a sensor's data may lie off the grid, and
+    where sources are live, whose data have times and no steps.
     Else a model is of steps, whatever their length.
     """
     sensors = configuration.sensors.values()
     is_off_grid = any(sensor.rate or sensor.off_grid != "refuse" for sensor in sensors)
-    return configuration.continuous is not None or bool(configuration.schedule) or is_off_grid
+    return (
+        configuration.mesh.is_live
+        or configuration.continuous is not None
+        or bool(configuration.schedule)
+        or is_off_grid
+    )
 
 
 def _matrix(matrix: Matrix | None) -> bytes:

@@ -17,6 +17,12 @@ from lsu_mesh.mesh.config.exact_times import keep_digits, spell_out_dates
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.filters import kind_of, read_filter
 from lsu_mesh.mesh.config.fusion import check_learning, read_fusion, read_identifier, shared_sensor_warnings
+from lsu_mesh.mesh.config.live_sources import (
+    check_external_plant,
+    input_delay_ns,
+    live_source_warnings,
+    settle_start,
+)
 from lsu_mesh.mesh.config.mesh_table import START_TIME, grid_of_table, read_mesh
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
 from lsu_mesh.mesh.config.overrides import apply, from_environment, from_flags
@@ -152,8 +158,12 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     ]
     _check_names(names, problems)
     check_reserved(network, names, problems)
+    mesh = settle_start(mesh, root, plant, sensors=sensors)
+    check_external_plant(plant, sensors, system, problems)
     files = [*(sensor.file for sensor in sensors.values()), None if plant is None else plant.file]
-    if any(file is not None and file.indexed_by == "time" for file in files) and mesh.start_ns is None:
+    if any(file is not None and file.indexed_by == "time" for file in files) and not (
+        mesh.start_ns is not None or mesh.starts_now
+    ):
         text = "is missing; files with a time column need it: step k is at start_time + k dt"
         problems.add("mesh", "start_time", text, expected=START_TIME.words)
     if model is None or prior is None:
@@ -179,13 +189,22 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
                 (
                     *shared_sensor_warnings(problems.file, filters, fusion),
                     *open_endpoint_warnings(problems.file, network),
+                    *live_source_warnings(
+                        problems.file,
+                        sensors,
+                        is_continuous=system.is_continuous,
+                        has_unknown_inputs=plant is None
+                        and model is not None
+                        and model.input_count > 0
+                        and input_box is None,
+                    ),
                 ),
             )
         ),
         identifiers=dict(sorted(identifiers.items())),
         continuous=system.continuous,
         schedule=system.schedule,
-        input_delay_ns=system.input_delay_ns,
+        input_delay_ns=input_delay_ns(mesh, plant, system.input_delay_ns),
     )
 
 

@@ -30,11 +30,13 @@ def read_mesh(root: Table) -> MeshSettings:
     seed = table.whole("seed", 1)
     rate = table.number("rate", 1.0 / dt if isinstance(dt, float) and dt else 1.0, above=0.0)
     start_ns: int | None = table.read("start_time", NO_START, START_TIME)
+    future_ns, past_ns = table.span_ns("future", MeshSettings.future_ns), table.span_ns("past", MeshSettings.past_ns)
     start_time = None if start_ns is None else float(Fraction(start_ns, 10**9))
     table.finish()
     return MeshSettings(
         name=name, dt=dt, steps=steps, seed=seed, rate=rate, start_time=start_time,
         exact_dt=exact if isinstance(exact, Fraction) else None, start_ns=start_ns,
+        starts_now=table.values.get("start_time") == NOW, future_ns=future_ns, past_ns=past_ns,
     )  # fmt: skip
 
 
@@ -59,6 +61,8 @@ def _as_dt(value: object) -> Fraction:
 
 
 def _as_moment(value: object) -> int | None:
+    if value == NOW:
+        return None
     try:
         return start_time_ns(value)[0]
     except ModelError as error:
@@ -66,6 +70,7 @@ def _as_moment(value: object) -> int | None:
         raise Unfit("" if text.startswith("expected") else text) from None
 
 
+NOW = "now"
 NO_START: int | None = None
 DT = Expected('a number > 0, or a fraction such as "1/30"', _as_dt)
-START_TIME = Expected[int | None]("seconds, or a moment such as 2024-05-01T12:00:00Z", _as_moment)
+START_TIME = Expected[int | None]('seconds, a moment such as 2024-05-01T12:00:00Z, or "now"', _as_moment)

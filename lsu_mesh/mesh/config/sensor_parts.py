@@ -90,7 +90,7 @@ def read_timing(table: Table, count: int | None, system: System, *, is_simulated
     if not is_simulated:
         for key in _SIMULATED:
             if key in table.values:
-                table.without(key, "is simulated, a sensor that plays a file has none", "remove the key")
+                table.without(key, "is simulated, and this sensor is not", "remove the key")
     if system.is_continuous:
         _refuse_discrete(table, timing)
     else:

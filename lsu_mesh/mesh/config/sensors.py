@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
 from lsu_mesh.mesh.config.data_file_keys import KEYS, read_file_format
 from lsu_mesh.mesh.config.expected import shown
@@ -19,6 +19,7 @@ from lsu_mesh.mesh.keys import NAME_RULE, is_name
 from lsu_mesh.model import LSUModel
 
 INPUTS = ("normal", "sine", "zero")
+SOURCES: tuple[Literal["simulated", "file", "external"], ...] = ("simulated", "file", "external")
 FAULTS: tuple[FaultKind, ...] = get_args(FaultKind)
 
 
@@ -30,7 +31,7 @@ def read_plant(
     problems: Problems,
 ) -> PlantSettings | None:
     """``[plant]``; needed as soon as one sensor is simulated."""
-    simulated = [sensor.name for sensor in sensors.values() if sensor.file is None]
+    simulated = [sensor.name for sensor in sensors.values() if sensor.is_simulated]
     if table is None:
         if not simulated:
             return None
@@ -38,6 +39,11 @@ def read_plant(
     name = table.text("name", "plant")
     if not is_name(name):
         table.wrong("name", f"{shown(name)} is no name; expected {NAME_RULE}", NAME_RULE)
+    is_external = table.choice("source", ("simulated", "file", "external"), "simulated") == "external"
+    if is_external:
+        for key in ("x1", "inputs", "file"):
+            if key in table.values:
+                table.without(key, "has no effect: a program sends the inputs", "remove it")
     x1 = table.vector("x1", None)
     if x1 is not None and model is not None and len(x1) != model.state_count:
         table.mismatch("x1", f"{model.state_count} numbers, one per state", len(x1))
@@ -48,7 +54,7 @@ def read_plant(
         table.without("inputs", "has no effect beside a file of inputs", "remove one of the two")
     inputs = "file" if file is not None else inputs
     table.finish()
-    return PlantSettings(name, None if x1 is None else tuple(x1), inputs, file)
+    return PlantSettings(name, None if x1 is None else tuple(x1), inputs, file, is_external)
 
 
 def read_sensor(table: Table, name: str, system: System, folder: Path) -> SensorSettings:
@@ -68,18 +74,18 @@ def read_sensor(table: Table, name: str, system: System, folder: Path) -> Sensor
     outputs = table.texts("outputs", default)
     if is_read and len(outputs) != len(rows):
         table.mismatch("outputs", f"{len(rows)} names, one per row of C", len(outputs))
-    source = table.choice("source", ("simulated", "file"), "file" if "file" in table.values else "simulated")
+    source = table.choice("source", SOURCES, "file" if "file" in table.values else "simulated")
     file = _read_file(table, len(rows), folder, "row of C")
-    if source == "simulated" and file is not None:
-        table.wrong("source", 'is "simulated", but a file is given; remove one of the two', '"file", or no file')
+    if source != "file" and file is not None:
+        table.wrong("source", f'is "{source}", but a file is given; remove one of the two', '"file", or no file')
     if source == "file" and file is None and "file" not in table.values:
         table.wrong("file", 'is missing; source = "file" needs the path of a CSV file', "the path of a CSV file")
     simulated = tuple(table.vector("simulated_r", []))
-    if simulated and (source == "file" or len(simulated) != len(rows) or min(simulated) < 0):
+    if simulated and (source != "simulated" or len(simulated) != len(rows) or min(simulated) < 0):
         table.mismatch("simulated_r", f'{len(rows)} half-widths ≥ 0, and source = "simulated"', shown(simulated))
     faults = tuple(_read_fault(item) for item in table.tables("faults"))
-    if faults and source == "file":
-        table.without("faults", "faults are simulated, a sensor that plays a file has none", "remove the key")
+    if faults and source != "simulated":
+        table.without("faults", "faults are simulated, and this sensor is not", "remove the key")
     further = read_further_outputs(table, len(rows) if is_read else None, system.model)
     timing = read_timing(table, len(rows) if is_read else None, system, is_simulated=source == "simulated")
     table.finish()
@@ -91,6 +97,7 @@ def read_sensor(table: Table, name: str, system: System, folder: Path) -> Sensor
         file=file,
         faults=faults,
         simulated_r=simulated,
+        live="external" if source == "external" else "",
         **further,
         **timing,
     )

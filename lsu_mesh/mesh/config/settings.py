@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
@@ -30,6 +30,8 @@ OnInconsistency = Literal["reset", "hold", "widen"]
 """What a filter does when data go on contradicting its set."""
 FaultKind = Literal["bias", "drift", "stuck", "random", "lost"]
 """A simulated fault of a sensor."""
+Source = Literal["simulated", "file", "external", "ros2"]
+"""Where measurements come from: the mesh simulates them, plays them, or a program sends them."""
 Learn = Literal["r", "rho", "both"]
 """Which bounds an identifier suggests."""
 CACHED_SECONDS, LEAST_CACHED = 6.0, 256
@@ -49,7 +51,14 @@ class MeshSettings:
     exact_dt: Fraction | None = None
     """``dt`` exactly as it is written, in seconds; ``None``: the decimal of ``dt``."""
     start_ns: int | None = None
-    """t_0 in nanoseconds since 1970, exactly as ``start_time`` is written."""
+    """t_0 in nanoseconds since 1970, exactly as ``start_time`` is written, or as the peers have agreed on it."""
+    starts_now: bool = False
+    """``start_time = "now"``: the peers agree on t_0 when they start."""
+    is_live: bool = False
+    """Step k is due at t_k, by the clock: a source is a program, or the mesh starts now."""
+    future_ns: int = 2 * 10**9
+    past_ns: int = 8 * 10**9
+    """So far may the time of a live datum lie ahead of the receiver's clock, and behind it."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +69,8 @@ class PlantSettings:
     x1: tuple[float, ...] | None
     inputs: str
     file: MeasurementFileSettings | None
+    is_external: bool = False
+    """A program of its own sends the inputs."""
 
 
 MeasurementFileSettings = DataFileSettings
@@ -78,7 +89,7 @@ class SensorFault:
 
 @dataclass(frozen=True)
 class SensorSettings:
-    """``[sensors.NAME]``; rows of C with half-widths r; simulated when ``file`` is None."""
+    """``[sensors.NAME]``; rows of C with half-widths r; simulated when ``file`` is None and it is not ``live``."""
 
     name: str
     C: tuple[tuple[float, ...], ...]
@@ -108,6 +119,26 @@ class SensorSettings:
     """Simulated: the moment of a measurement lies up to so much after its turn."""
     clock_error_ns: int = 0
     """Simulated: its stamps are wrong by up to so much."""
+
+    live: Literal["", "external", "ros2"] = ""
+    """The kind of program that sends its measurements; empty: the mesh simulates or plays them."""
+
+    @property
+    def source(self) -> Source:
+        """Where its measurements come from."""
+        if self.live:
+            return self.live
+        return "simulated" if self.file is None else "file"
+
+    @property
+    def is_live(self) -> bool:
+        """Whether its measurements come from a program, at times of their own."""
+        return self.live != ""
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the mesh simulates it on the plant's truth."""
+        return self.source == "simulated"
 
     @property
     def true_r(self) -> tuple[float, ...]:
@@ -279,6 +310,24 @@ class Configuration:
             if entry.first <= k and isinstance(entry.model, LSUModel):
                 found = entry.model
         return found
+
+    @property
+    def awaits_start(self) -> bool:
+        """Whether t_0 is still to be agreed on."""
+        return self.mesh.starts_now and self.mesh.start_ns is None
+
+    def started(self, start_ns: int) -> Configuration:
+        """The same mesh with t_0 ≥ 0 known, in its values too, so that a recording holds it."""
+        moment = f"{start_ns // 10**9}.{start_ns % 10**9:09d}"
+        table = {key: value for key, value in self.values.get("mesh", {}).items() if key != "start_time"}
+        mesh = replace(self.mesh, start_ns=start_ns, start_time=float(Fraction(start_ns, 10**9)))
+        return replace(self, mesh=mesh, values={**self.values, "mesh": {**table, "start_time": moment}})
+
+    def is_external(self, role: str, name: str) -> bool:
+        """Whether a peer is a program of somebody else, which nobody of the mesh starts."""
+        if role == "sensor":
+            return self.sensors[name].live == "external"
+        return role == "plant" and self.plant is not None and self.plant.is_external
 
     @property
     def has_one_model(self) -> bool:

@@ -132,6 +132,8 @@ class RunReport:
         self.duplicates: dict[str, str] = {}
         """Peers that ran more than once, and where."""
         self._processes = Processes()
+        self.used: set[str] = set()
+        """Names of those whose messages went into an estimate."""
 
     def deliver(self, key: str, payload: bytes, arrival_ns: int) -> None:
         """Take a payload as it came."""
@@ -182,6 +184,7 @@ class RunReport:
                 lower=message.lower,
                 upper=message.upper,
             )
+        self.used.update(reference[1].rpartition("/")[2] for reference in message.used)
         if message.status == "inconsistent":
             track.inconsistent.add(step)
         truth = self._truth.get(step)

@@ -76,7 +76,7 @@ def links(configuration: Configuration) -> list[tuple[str, str]]:
     plant = configuration.plant
     edges = []
     if plant is not None:
-        edges += [(plant.name, sensor.name) for sensor in configuration.sensors.values() if sensor.file is None]
+        edges += [(plant.name, sensor.name) for sensor in configuration.sensors.values() if sensor.is_simulated]
     for name, settings in configuration.filters.items():
         edges += [(sensor, name) for sensor in settings.sensors]
     for name, fusion in configuration.fusion.items():

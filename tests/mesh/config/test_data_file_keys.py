@@ -68,5 +68,5 @@ def test_another_start_time_is_refused(tmp_path: Path, root: Path, start: str) -
     configuration = playing(tmp_path, root, "step,y\n1,2\n", 'file = "s1.csv"')
     text = configuration.path.read_text().replace("start_time = 1600120070.0", f"start_time = {start}")
     configuration.path.write_text(text)
-    with pytest.raises(ConfigurationError, match=r"\[mesh\] start_time: expected seconds, or a moment"):
+    with pytest.raises(ConfigurationError, match=r"\[mesh\] start_time: expected seconds, a moment"):
         load(configuration.path)

@@ -114,7 +114,10 @@ def test_a_flag_keeps_every_digit_too(tmp_path: Path) -> None:
         ({"dt": '"-1/30"'}, '[mesh] dt: expected a number > 0, or a fraction such as "1/30", found "-1/30"'),
         ({"dt": "inf"}, '[mesh] dt: expected a number > 0, or a fraction such as "1/30", found inf'),
         ({"dt": "1e-12"}, "[mesh] dt: dt = 1/1000000000000 s is below a nanosecond"),
-        ({"start": "1e300"}, "[mesh] start_time: expected seconds, or a moment such as 2024-05-01T12:00:00Z, found"),
+        (
+            {"start": "1e300"},
+            '[mesh] start_time: expected seconds, a moment such as 2024-05-01T12:00:00Z, or "now", found',
+        ),
     ],
 )
 def test_a_grid_that_cannot_be_is_a_mistake(tmp_path: Path, parts: dict[str, str], words: str) -> None:
@@ -289,7 +292,7 @@ def test_a_key_of_a_sensor_that_cannot_be_is_a_mistake(tmp_path: Path, model: st
 def test_what_is_simulated_is_none_of_a_sensor_that_plays_a_file(tmp_path: Path, key: str) -> None:
     (tmp_path / "gauge.csv").write_text("step,a,b\n1,0.5,1\n")
     words = mistake(tmp_path, sensor=f'file = "gauge.csv"\n{key} = "1ms"')
-    assert words == f"{GAUGE}{key}: is simulated, a sensor that plays a file has none; remove the key"
+    assert words == f"{GAUGE}{key}: is simulated, and this sensor is not; remove the key"
 
 
 def test_a_feedthrough_needs_inputs(tmp_path: Path) -> None:
