@@ -107,7 +107,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh.mesh.nodes": [
         ("node", "schedule"),
-        ("rate_limit", "source_timeout"),
+        ("rate_limit", "source_timeout", "useless_data"),
         (REST,),
         ("filter", "fusion"),
     ],

@@ -132,8 +132,8 @@ class Admission:
         """What makes messages of payloads; many receivers in one process may share one with a memory."""
         self.publishers: DuplicatePublishers | None = None
         """Which of two living processes of one key is refused; None: what all of them send is let in."""
-        self.datum_refused: Callable[[str, str, float], None] | None = None
-        """Told of each datum refused for its time: source, reason, and seconds that it is late (below 0: early)."""
+        self.datum_refused: Callable[[Refused, int], None] | None = None
+        """Told of each datum that is refused for its time, and when that was."""
 
     def admit(self, key: str, payload: bytes, now: int | None = None) -> Message | None:
         """The message, or ``None`` when it is refused or a copy.
@@ -148,7 +148,7 @@ class Admission:
                 return None
             self._check_publisher(key, message, now)
         except Refused as refusal:
-            self._refuse(key, refusal)
+            self._refuse(key, refusal, now)
             return None
         self.received += 1
         if unknown:
@@ -182,11 +182,11 @@ class Admission:
             counts |= {f"unknown fields.{name}": count for name, count in sorted(self.unknown_fields.items())}
         return counts
 
-    def _refuse(self, key: str, refusal: Refused) -> None:
+    def _refuse(self, key: str, refusal: Refused, now: int | None) -> None:
         self.refused[refusal.reason] += 1
         self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
-        if refusal.seconds is not None and self.datum_refused is not None:
-            self.datum_refused(refusal.source, refusal.reason, refusal.seconds)
+        if refusal.seconds is not None and now is not None and self.datum_refused is not None:
+            self.datum_refused(refusal, now)
 
     def _check_publisher(self, key: str, message: Message, now: int | None) -> None:
         """Refuse what a second living process sends; what was refused when the first was gone already is asked for."""
@@ -247,7 +247,9 @@ class Admission:
         if message.step < 1 and not counts_by_time:
             raise Refused("step", "steps count from 1")
         if self._last is not None and message.step > self._last + 1:
-            raise Refused("step", f"step {message.step} of a mesh that ends at step {self._last}")
+            text = f"step {message.step} of a mesh that ends at step {self._last}"
+            seconds = (self._last - message.step) / self._configuration.mesh.rate
+            raise Refused("step", text, source=name, seconds=seconds)
         if isinstance(message, Fused) and message.policy not in POLICIES:
             known = ", ".join(POLICIES)
             raise Refused("policy", f"fused by policy {message.policy!r}, which this peer does not know ({known})")

@@ -127,17 +127,23 @@ class Node(ABC):
         return messages
 
     def warnings(self, now: int) -> list[Message]:
-        """Events about what has just been found wrong around the node: a peer that runs twice."""
+        """Events about what has just been found wrong around the node, and stands in its health as long as it is so."""
         found = [self._duplicate_publisher(pair, now) for pair in self._publishers.take_news()]
         text, other = self._other_process.take_news(now), self._other_process.other(now)
         if text is not None and other is not None:
             about: About = {"peer": f"{self.role}/{self.name}", "host": other.host, "boot": other.boot}
-            found.append(self.event("WARN", DUPLICATE_PROCESS, text, now=now, step=self.step(), about=about))
+            found.append(self.warning(DUPLICATE_PROCESS, text, now, about=about))
         return found
+
+    def warning(self, code: str, text: str, now: int, *, about: About) -> Event:
+        """An event about what a complaint tells as long as it is so: the health needs no memory of it."""
+        event = self.event("WARN", code, text, now=now, step=self.step(), about=about)
+        del self._warnings["WARN", code]
+        return event
 
     def _duplicate_publisher(self, pair: DuplicatePublisher, now: int) -> Message:
         about: About = {"peer": pair.src, "key": pair.key, "used": pair.used, "refused": pair.refused}
-        return self.event("WARN", "duplicate-publisher", pair.words, now=now, step=self.step(), about=about)
+        return self.warning("duplicate-publisher", pair.words, now, about=about)
 
     def warm_up(self) -> None:
         """Do once, and forget, what a step does, so that the first real step finds all kernels loaded."""
