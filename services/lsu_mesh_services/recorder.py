@@ -24,6 +24,7 @@ from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part
+from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
 
 ROLE_NAME = "recorder"
@@ -70,7 +71,8 @@ def _record(start: MeshStart, part: Path, session: Session, path: Path) -> int:
     """Write one part of a recording, until told to stop or until the mesh turns out to have another start."""
     recorder: Recorder | None = None
     try:
-        with Bus(session.settings, session.clock) as bus:
+        settings = session.settings
+        with Bus(settings, session.clock) as bus, connection_report(ROLE_NAME, bus, settings):
             started = start.configuration(bus, session.clock, lambda: bool(session.stop))
             if started is None:
                 return OK
@@ -88,7 +90,7 @@ def _record(start: MeshStart, part: Path, session: Session, path: Path) -> int:
             service.declare()
             gc.collect()
             gc.freeze()  # as every peer does
-            print(f"recorder: on the mesh, writing {part}", file=sys.stderr)
+            print(f"recorder: writing {part}", file=sys.stderr)
             while not session.stop and start.other_ns is None:
                 service.turn()
             service.finish()

@@ -41,7 +41,7 @@ def refused(peer: dict[str, Any]) -> float:
 
 
 def test_a_sensor_and_a_filter_that_run_twice_are_named_until_one_is_gone(start: Start) -> None:
-    plant = start("plant", "-l", "{endpoint}", *COMMON)
+    plant = start("plant", "-l", "{endpoint}", "-X", "network.entry={endpoint}", *COMMON)
     at = plant.process.args[plant.process.args.index("-l") + 1]
     start("fusion", "main", "-e", at, *COMMON)  # it gives the second filter a set to start from
     first = {name: start(role, name, "-e", at, *COMMON) for role, name in (("sensor", "s1"), ("filter", "para"))}

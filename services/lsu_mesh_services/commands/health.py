@@ -19,7 +19,7 @@ from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
 from lsu_mesh_services.mesh_start import find_start
 from lsu_mesh_services.network.receive_queue import Arrival
-from lsu_mesh_services.session import session_settings, with_session
+from lsu_mesh_services.session import connection_report, session_settings, with_session
 
 SHOWN = ("received", "gaps", "duplicates", "dropped", "late", "rewinds", "contradictions", "behind", "queue", "step_ms")
 """Counters with a column of their own; refusals are summed, and listed by reason below the table."""
@@ -43,7 +43,8 @@ def _listen(configuration: Configuration, options: argparse.Namespace) -> list[P
     """Heartbeats and liveliness of so many seconds, judged at their end."""
     clock, mesh = Clock(), configuration.mesh.name
     observer = HealthObserver(configuration, clock.now())
-    with Bus(session_settings(configuration, options), clock) as bus:
+    settings = session_settings(configuration, options)
+    with Bus(settings, clock) as bus, connection_report("health", bus, settings, says_connected=False):
         configuration = find_start(configuration, bus, clock, options.seconds) or configuration.started(0)
         admission = Admission(configuration, ("health",))
         bus.subscribe(f"{PREFIX}/{mesh}/health/*")

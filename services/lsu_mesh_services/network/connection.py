@@ -42,7 +42,7 @@ class ConnectionWords:
     """
 
     def __init__(self, connect: Sequence[str], listen: Sequence[str], *, says_connected: bool = True) -> None:
-        self._connect, self._listen = tuple(connect), tuple(listen)
+        self.connect, self._listen = tuple(connect), tuple(listen)
         self._says_connected = says_connected
         self._links = 0
         self._began: float | None = None
@@ -50,11 +50,6 @@ class ConnectionWords:
         self._changed = 0.0
         self._said = ""
         self._said_alone = False
-
-    @property
-    def is_alone(self) -> bool:
-        """Whether it is connected to nobody."""
-        return self._links == 0
 
     def say(self, links: int, reasons: Mapping[str, str] | None, now: float) -> str | None:
         """What has to be said now. ``reasons``: by endpoint, why it does not answer; None: not known yet."""
@@ -71,13 +66,13 @@ class ConnectionWords:
         return text
 
     def _of_nobody(self, reasons: Mapping[str, str] | None, passed: float) -> str | None:
-        knows_why = reasons is not None or not self._connect
+        knows_why = reasons is not None or not self.connect
         if passed < (ALONE_S if knows_why else MAX_ALONE_S):
             return None
         if not knows_why and self._said:
             return None
         self._said_alone = True
-        return alone_words(self._connect, self._listen, reasons or {})
+        return alone_words(self.connect, self._listen, reasons or {})
 
     def _of_somebody(self, links: int, now: float) -> str | None:
         assert self._began is not None
@@ -106,13 +101,13 @@ def why_silent(endpoint: str) -> str:
     if not host or not port.isdigit():
         return ""
     try:
-        found = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
+        socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
     except (socket.gaierror, UnicodeError):
         return UNKNOWN_NAME
     if protocol not in STREAMS:
         return ""
     try:
-        with socket.create_connection(found[0][4][:2], timeout=PROBE_TIMEOUT_S):
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=PROBE_TIMEOUT_S):
             return NO_SESSION
     except ConnectionRefusedError:
         return REFUSED
@@ -131,8 +126,8 @@ class ConnectionReport:
         Tells to how many others the session is connected.
     """
 
-    def __init__(self, who: str, links: Callable[[], int], words: ConnectionWords, connect: Sequence[str]) -> None:
-        self._who, self._links, self._words, self._connect = who, links, words, tuple(connect)
+    def __init__(self, who: str, links: Callable[[], int], words: ConnectionWords) -> None:
+        self._who, self._links, self._words, self._connect = who, links, words, words.connect
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="connection", daemon=True)
         self._probe: threading.Thread | None = None

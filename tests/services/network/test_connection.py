@@ -103,7 +103,7 @@ def test_a_name_that_takes_long_to_look_up_holds_nobody_up(
     links = [0]
     words = ConnectionWords(["tcp/slow:1"], [])
     began = time.monotonic()
-    with ConnectionReport("filter a", lambda: links[0], words, ["tcp/slow:1"]):
+    with ConnectionReport("filter a", lambda: links[0], words):
         time.sleep(1.3)
         links[0] = 3
         time.sleep(0.8)
