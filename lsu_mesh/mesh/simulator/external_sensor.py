@@ -54,8 +54,8 @@ def draw_clock_steps(
 def with_simulated_plant(configuration: Configuration, start_ns: int) -> Configuration:
     """The mesh of live sources with t_0 known, and a plant that moves what they measure."""
     plant = configuration.plant
-    if plant is None or plant.is_external:
-        plant = PlantSettings("plant" if plant is None else plant.name, None, "normal", None)
+    if plant is None:
+        plant = PlantSettings("plant", None, "normal", None)
     return replace(configuration.started(start_ns), plant=plant)
 
 
@@ -143,8 +143,9 @@ class ExternalSensor(Node):
         ]  # fmt: skip
 
     def offset(self, at: int) -> int:
-        """How wrong the clock is, in ns."""
-        return sum(step.offset_ns for step in self._clock_steps if step.begin <= at < step.end)
+        """How wrong the clock is, in ns: the last setting counts, as sums of two could be small and be believed."""
+        wrong = [step for step in self._clock_steps if step.begin <= at < step.end]
+        return max(wrong, key=lambda step: step.begin).offset_ns if wrong else 0
 
     def wakeup(self) -> int | None:
         return self._next
