@@ -134,7 +134,8 @@ class UselessData:
         for source, row in self._lasting(now):
             if not row.is_told:
                 row.is_told = True
-                news.append(News(USELESS, source, self._words(source, row), row.reason, row.seconds))
+                text = self._words(source, row)
+                news.append(News(USELESS, source, text, reason=row.reason, seconds=row.seconds))
         return news
 
     @property
@@ -156,7 +157,7 @@ class UselessData:
     def _end(self, row: _Row | None, source: str) -> None:
         if row is not None and row.is_told:
             text = f"{self._kinds[source]} {source}: its data are used again"
-            self._over.append(News(USED_AGAIN, source, text, row.reason, 0.0))
+            self._over.append(News(USED_AGAIN, source, text, reason=row.reason, seconds=0.0))
 
     def _words(self, source: str, row: _Row) -> str:
         kind = self._kinds[source]
