@@ -8,8 +8,9 @@ import sys
 from collections.abc import Callable, Iterable
 
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
-from lsu_mesh.mesh.messages import Message, encode, encoding
+from lsu_mesh.mesh.messages import Event, Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
@@ -20,6 +21,7 @@ from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.mesh_start import MeshStart, moment_text
 from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
@@ -48,7 +50,7 @@ def run_peer(
         return USAGE
     while True:
         start = MeshStart(configuration, *who, known_ns=known_ns)
-        with Bus(settings, clock) as bus:
+        with Bus(settings, clock) as bus, connection_report(" ".join(who), bus, settings):
             if node is None:
                 started = start.configuration(bus, clock, lambda: bool(stop))
                 if started is None:
@@ -71,7 +73,6 @@ def _run(node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is
     bus.keep(node.configuration.cached * node.messages_per_step)
     peer = Peer(node, bus, clock, start)
     peer.declare()
-    print(f"{node.role} {node.name}: on the mesh", file=sys.stderr)
     if is_moved:
         peer.tell_moved()
     said_finished = False
@@ -108,6 +109,7 @@ class Peer:
         for topic, name in self._node.subscriptions():
             is_live = self._node.configuration.is_live(topic, name)
             (self._bus.subscribe_live if is_live else self._bus.subscribe)(key(self._mesh, topic, name))
+        self._bus.subscribe_live(key(self._mesh, "health", self._node.name))  # another process of the own name
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", self._node.name))
         if isinstance(self._node, FilterNode):
@@ -212,11 +214,8 @@ class Peer:
         if arrival.what == "alive":
             self._start.somebody_came(arrival.arrival_ns)
         address = parse(arrival.key)
-        if address is not None and isinstance(self._node, Estimator) and address.name in self._node.sources:
-            if arrival.what == "gone":
-                self._node.absent.add(address.name)
-            else:
-                self._node.absent.discard(address.name)
+        if address is not None:
+            self._node.record_alive(address.name, arrival.what == "alive", arrival.arrival_ns)
         return []
 
     def _canonical(self, sample_key: str) -> str:
@@ -227,4 +226,6 @@ class Peer:
 
     def _publish(self, messages: Iterable[Message]) -> None:
         for message in messages:
+            if isinstance(message, Event) and message.code == DUPLICATE_PROCESS:
+                print(f"{self._node.role} {self._node.name}: {message.text}", file=sys.stderr)
             self._bus.publish(self._node.key(message), encode(message), encoding(message.topic))
