@@ -78,7 +78,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.fusion": [("intersection", "point"), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
-        ("message_examples", "sets", "data_files"),
+        ("message_examples", "sets", "data_files", "ros2"),
         ("config",),
         ("access", "input_time", "measurement_time", "model_answer", "time_requirements"),
         ("admission",),
