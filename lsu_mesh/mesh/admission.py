@@ -9,6 +9,7 @@ from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.input_time import check_beginning
 from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.live_times import check_live_time
 from lsu_mesh.mesh.measurement_time import is_timed, placed
 from lsu_mesh.mesh.messages import (
     ConstrainedZonotopeMessage,
@@ -53,9 +54,17 @@ class Sequence:
         self._newest = first - 1
         self._unseen = set(range(max(0, first - WINDOW), first))
         self._gaps: set[int] = set()
+        self._newest_sent = 0
+        """When the newest message was sent."""
 
-    def admit(self, seq: int) -> bool:
-        """Whether ``seq`` is new."""
+    def admit(self, seq: int, sent_ns: int = 0) -> bool:
+        """Whether ``seq`` is new.
+
+        Raises :class:`Refused` where it has come before in a message that was sent earlier: this is another message.
+        """
+        if seq <= self._newest and sent_ns > self._newest_sent and not (seq in self._gaps or seq in self._unseen):
+            raise Refused("sequence", f"number {seq} came before; draw a new boot at each start, or count on")
+        self._newest_sent = max(self._newest_sent, sent_ns)
         if seq > self._newest:
             self._gaps.update(range(max(self._newest + 1, seq - WINDOW), seq))
             self._newest = seq
@@ -116,16 +125,21 @@ class Admission:
         self.decoder: Callable[[str, bytes], tuple[Message, tuple[str, ...]]] = read
         """What makes messages of payloads; many receivers in one process may share one with a memory."""
 
-    def admit(self, key: str, payload: bytes) -> Message | None:
-        """The message, or ``None`` when it is refused or a copy."""
+    def admit(self, key: str, payload: bytes, now: int | None = None) -> Message | None:
+        """The message, or ``None`` when it is refused or a copy.
+
+        ``now``: the receiver's clock in ns since 1970, by which times of live sources are judged; None: they are not.
+        """
         try:
             message, unknown = self._checked(key, payload)
+            if now is not None and isinstance(message, Measurement | Input):
+                check_live_time(self._configuration, message, now)
+            if not self._is_new(key, message):
+                self.duplicates += 1
+                return None
         except Refused as refusal:
             self.refused[refusal.reason] += 1
             self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
-            return None
-        if not self._is_new(key, message):
-            self.duplicates += 1
             return None
         self.received += 1
         if unknown:
@@ -222,7 +236,7 @@ class Admission:
         if sequence is None:
             self._forget_old_boots(key)
             sequence = self._sequences[identity] = Sequence(message.seq)
-        return sequence.admit(message.seq)
+        return sequence.admit(message.seq, message.sent_ns)
 
     def _forget_old_boots(self, key: str) -> None:
         known = [identity for identity in self._sequences if identity[0] == key]

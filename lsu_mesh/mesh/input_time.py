@@ -7,7 +7,7 @@ from lsu_mesh.mesh.messages import Input, Refused
 
 
 def check_beginning(configuration: Configuration, message: Input) -> None:
-    """An input of step k begins to act at t_k, or, of a continuous model, up to ``input_delay`` after it.
+    """An input of step k begins to act at t_k, or up to ``input_delay`` after it; one of a program, anywhere in it.
 
     Raises
     ------

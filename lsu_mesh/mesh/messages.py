@@ -144,7 +144,8 @@ class Message(_Strict, frozen=True, kw_only=True):
     src: Text
     boot: str
     seq: Count
-    step: Count
+    step: Count = 0
+    """k; 0 where it is not of a step: a measurement with a time of its own, which the mesh puts on its step."""
     sent_ns: Count
     origin_ns: Count
     model: Annotated[str, Meta(max_length=64)]

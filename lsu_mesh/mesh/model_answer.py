@@ -58,7 +58,7 @@ class ModelAnswer(Struct, frozen=True, kw_only=True):
     start_ns: int | None = None
     """The time of step 0; ``None``: the file has none."""
     boot: str | None = None
-    """Kept for the boot of the answering process; not told yet."""
+    """Of the process that answers."""
     offset: list[float] | None = None
     continuous: Dynamics | None = None
     """The rates of a continuous model; ``None`` for a discrete one."""
@@ -66,10 +66,11 @@ class ModelAnswer(Struct, frozen=True, kw_only=True):
     """Models that replace this one later."""
 
 
-def model_answer(configuration: Configuration) -> ModelAnswer:
-    """What every estimator of a mesh answers: the declared model."""
+def model_answer(configuration: Configuration, boot: str | None = None) -> ModelAnswer:
+    """What every estimator of a mesh answers: the declared model, and when the mesh has started."""
     model = configuration.base_model
     return ModelAnswer(
+        boot=boot,
         model=configuration.digest(),
         dt=configuration.mesh.dt,
         A=model.A.tolist(),

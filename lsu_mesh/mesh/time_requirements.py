@@ -43,7 +43,8 @@ def _of_the_mesh(configuration: Configuration) -> list[str]:
     if not delay:
         return []
     found = []
-    if configuration.continuous is None:
+    is_external = configuration.plant is not None and configuration.plant.is_external
+    if configuration.continuous is None and not is_external:
         found.append("input_delay needs a continuous model: a discrete one knows nothing between its steps")
     if configuration.base_model.input_count and configuration.input_box is None:
         found.append("input_delay needs input_box: what acts before the first input is not known otherwise")

@@ -120,8 +120,14 @@ class Bus:
     def _enqueue_sample(self, sample: Any) -> None:
         self._arrivals.put(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
 
+    def keep(self, count: int) -> None:
+        """How many messages publishers that are declared from now on keep for those who come late."""
+        self._settings = replace(self._settings, cache=count)
+
     def declare_alive(self, key: str) -> None:
-        """Show that this process is there, for as long as it is."""
+        """Show that this process is there, for as long as it is; once is enough."""
+        if key in self._own_tokens:
+            return
         self._own_tokens.add(key)
         self._declared.append(self._session.liveliness().declare_token(key))
 
@@ -180,6 +186,16 @@ class Bus:
                 self._enqueue_sample(reply.ok)
 
         self._session.get(key, answered, timeout=2.0)
+
+    def ask_all(self, key: str) -> None:
+        """Query a key of everybody who answers it; every answer is queued as a sample when it comes."""
+
+        def answered(reply: Any) -> None:
+            if reply.ok is not None:
+                self._enqueue_sample(reply.ok)
+
+        mode, target = zenoh.ConsolidationMode.NONE, zenoh.QueryTarget.ALL
+        self._session.get(key, answered, target=target, consolidation=mode, timeout=2.0)
 
     def ask_cache(self, key: str) -> None:
         """Ask the publisher of a key for all that its cache holds; it is queued as samples."""

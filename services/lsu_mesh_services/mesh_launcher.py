@@ -17,6 +17,7 @@ from lsu_mesh_services.configuration import DEMO, flags
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
 from lsu_mesh_services.monitoring.run_report import RunReport
 from lsu_mesh_services.monitoring.table import Progress, print_json, print_table
+from lsu_mesh_services.network.mesh_start import moment_text
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.network.security import certificates, check_endpoints
 from lsu_mesh_services.played_files import accounts_or_explain, last_step
@@ -30,6 +31,8 @@ READY_S = 60.0
 LINKS_S = 10.0
 """How long to wait for the last connections when all peers are there."""
 START_LEAD_S = 0.3
+LIVE_LEAD_S = 2.0
+"""So long after the launch t_0 of a mesh lies that starts now: its prior is of that moment."""
 MAX_AT_ONCE = 1024
 """Messages that are processed before the children and the stop flag are checked again, however many more wait."""
 QUIET_S = 4.0
@@ -71,9 +74,22 @@ class Run:
     """The last step of the run; None: until stopped."""
     viewer: Viewer | None = None
     alive: set[str] = field(default_factory=set)
+    seen: set[str] = field(default_factory=set)
+    """Who was alive at some time."""
     happened: list[str] = field(default_factory=list)
     began: float = field(default_factory=time.monotonic)
     stopping: bool = False
+    began_following: bool = False
+
+    @property
+    def external(self) -> set[str]:
+        """Peers that somebody else starts."""
+        return {name for role, name in self.configuration.peers() if self.configuration.is_external(role, name)}
+
+    @property
+    def came(self) -> set[str]:
+        """Peers that were there, or have sent something."""
+        return self.seen | self.report.used
 
     def record(self, words: str) -> None:
         """Remember what happened and when, for the table."""
@@ -103,7 +119,10 @@ class Run:
         if address is None:
             return
         if arrival.what == "alive":
+            if address.name not in self.alive and address.name in self.external and self.began_following:
+                self.record(f"{address.name} has come")
             self.alive.add(address.name)
+            self.seen.add(address.name)
         elif address.name in self.alive:
             self.alive.discard(address.name)
             if not self.stopping:
@@ -124,6 +143,8 @@ def _run_mesh(
 ) -> int:
     stop: Stop = options.stop
     clock = Clock()
+    if configuration.awaits_start:
+        configuration = configuration.started(clock.now() + int(LIVE_LEAD_S * 1e9))
     settings = _session_settings(configuration, options)
     with Bus(settings, clock) as bus:
         recording = None if options.no_record else _recording_path(configuration, options)
@@ -182,6 +203,8 @@ def _supervise(run: Run) -> int:
             run.viewer.close()
         run.supervisor.kill()
     run.happened += complaints
+    never = sorted(run.external - run.came)
+    run.happened += [f"{name}, which is external, never came" for name in never]
     if code != OK:
         for words in run.happened:
             print(words, file=sys.stderr)
@@ -203,8 +226,17 @@ def _announce(run: Run) -> None:
     length = "until stopped" if last is None else f"{last} steps"
     where = "not recorded" if run.recording is None else f"recorded in {run.recording}"
     played = 0 if run.player is None else sum(role in ("plant", "sensor") for role, _ in run.configuration.peers())
-    count = len(run.configuration.peers()) - (run.recording is None) - played
+    external = sorted(run.external)
+    count = len(run.configuration.peers()) - (run.recording is None) - played - len(external)
     print(f"mesh {mesh.name!r}: {count} peers, {length} at {mesh.rate:g} Hz, {where}", file=sys.stderr)
+    if mesh.is_live:
+        print(
+            f"t_0 of the mesh is {moment_text(run.configuration.grid.start_ns)}: its prior is of then", file=sys.stderr
+        )
+    for name in external:
+        print(
+            f"{name} is external: nobody waits for it; lsu-mesh publish {name} sends what it measures", file=sys.stderr
+        )
 
 
 def _start(run: Run) -> int:
@@ -215,8 +247,8 @@ def _start(run: Run) -> int:
     for role, name in run.configuration.peers():
         if role == "recorder" and run.recording is None:
             continue
-        is_source = _is_source(run.configuration, role, name)
-        if run.player is not None and role in ("plant", "sensor"):
+        is_source = not run.configuration.mesh.is_live and _is_source(run.configuration, role, name)
+        if (run.player is not None and role in ("plant", "sensor")) or name in run.external:
             continue
         child = run.supervisor.start(role, name, _arguments(run, role), held=is_source)
         names.add(name)
@@ -231,6 +263,7 @@ def _start(run: Run) -> int:
         run.player.begin(begin)
     for child in held:
         run.supervisor.tell(child, str(begin))
+    run.began_following = True
     return OK
 
 
@@ -253,7 +286,9 @@ def _arguments(run: Run, role: str) -> list[str]:
     end = [] if last is None else [f"mesh.steps={last}"]
     for override in [*flags(run.options), *run.options.overrides, *end]:
         arguments += ["-X", override]
-    if role in ("plant", "sensor"):
+    if run.configuration.mesh.starts_now:
+        arguments += ["-X", f'mesh.start_time="{run.configuration.values["mesh"]["start_time"]}"']
+    if role in ("plant", "sensor") and not run.configuration.mesh.is_live:
         arguments += ["--start-at", "-"]
     if role == "recorder":
         arguments += ["--record", str(run.recording)]

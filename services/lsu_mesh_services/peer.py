@@ -5,9 +5,9 @@ from __future__ import annotations
 import gc
 import socket
 import sys
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable
 
+from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
@@ -16,7 +16,9 @@ from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.network.gap_recovery import GapRecovery
+from lsu_mesh_services.network.mesh_start import MeshStart, moment_text
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.stop import Stop
 
@@ -25,36 +27,69 @@ MAX_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
 
-def run_node(node: Node, settings: SessionSettings, stop: Stop) -> int:
-    """Run a node until it is told to stop; returns the exit code."""
-    clock = Clock()
+def run_peer(
+    configuration: Configuration,
+    who: tuple[str, str],
+    make: Callable[[Configuration], Node | None],
+    *,
+    settings: SessionSettings,
+    stop: Stop,
+) -> int:
+    """Run the node of ``(role, name)`` until it is told to stop; returns the exit code.
+
+    ``make`` makes the node of a mesh whose start is known, or says why it cannot and returns None. Where the mesh turns
+    out to have started earlier than this peer knew, the node begins again.
+    """
+    clock, known_ns = Clock(), None
+    node = None if configuration.awaits_start else make(configuration)
+    if node is None and not configuration.awaits_start:
+        return USAGE
+    while True:
+        start = MeshStart(configuration, *who, known_ns=known_ns)
+        with Bus(settings, clock) as bus:
+            if node is None:
+                started = start.configuration(bus, clock, lambda: bool(stop))
+                if started is None:
+                    return OK
+                node = make(started)
+                if node is None:
+                    return USAGE
+            _run(node, bus, clock, stop=stop, start=start, is_moved=known_ns is not None)
+        if start.other_ns is None:
+            return OK
+        known_ns, node = start.other_ns, None
+
+
+def _run(node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is_moved: bool) -> None:
+    """Until the process is told to stop, or the mesh turns out to have another start."""
     node.started_ns, node.host = clock.now(), socket.gethostname()
     node.warm_up()
     gc.collect()
     gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
-    settings = replace(settings, cache=settings.cache * node.messages_per_step)
-    with Bus(settings, clock) as bus:
-        peer = Peer(node, bus, clock)
-        peer.declare()
-        print(f"{node.role} {node.name}: on the mesh", file=sys.stderr)
-        said_finished = False
-        while not stop:
-            peer.turn()
-            if node.finished and not said_finished:
-                said_finished = True
-                print(
-                    f"{node.role} {node.name}: all steps are published; serving late joiners until stopped",
-                    file=sys.stderr,
-                )
-        peer.farewell()
-    return 0
+    bus.keep(node.configuration.cached * node.messages_per_step)
+    peer = Peer(node, bus, clock, start)
+    peer.declare()
+    print(f"{node.role} {node.name}: on the mesh", file=sys.stderr)
+    if is_moved:
+        peer.tell_moved()
+    said_finished = False
+    while not stop and start.other_ns is None:
+        peer.turn()
+        if node.finished and not said_finished:
+            said_finished = True
+            print(
+                f"{node.role} {node.name}: all steps are published; serving late joiners until stopped",
+                file=sys.stderr,
+            )
+    peer.farewell()
 
 
 class Peer:
     """The loop around a node: drain the queue, tick, publish."""
 
-    def __init__(self, node: Node, bus: Bus, clock: Clock) -> None:
+    def __init__(self, node: Node, bus: Bus, clock: Clock, start: MeshStart) -> None:
         self._node = node
+        self._start = start
         self._bus = bus
         self._clock = clock
         self._mesh = node.configuration.mesh.name
@@ -97,12 +132,20 @@ class Peer:
             return None if last is None else (own_key, encode(last), encoding(last.topic))
 
         self._bus.answer(own_key, latest)
-        model, asked = encode_model(model_answer(node.configuration)), model_key(self._mesh)
+        model, asked = encode_model(model_answer(node.configuration, node.boot)), model_key(self._mesh)
         self._bus.answer(asked, lambda: (asked, model, "application/msgpack"))
+
+    def tell_moved(self) -> None:
+        """That the mesh has an earlier start than this peer knew, and that it has begun again."""
+        start_ns = self._node.configuration.grid.start_ns
+        text = f"the mesh has started earlier, at {moment_text(start_ns)}; begun again with that start"
+        about: dict[str, str | int | float | None] = {"start_ns": start_ns}
+        self._publish([self._node.event("WARN", "start-changed", text, now=self._clock.now(), step=0, about=about)])
 
     def turn(self) -> None:
         """Wait for something to do, then do all of it."""
         self._watch_links()
+        self._start.check(self._bus, self._clock.now())
         self._recovery.check(self._clock.now(), self._bus.waiting())
         arrival = self._bus.next(self._patience())
         began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
@@ -151,7 +194,11 @@ class Peer:
 
     def _take(self, arrival: Arrival) -> list[Message]:
         if arrival.what == "sample":
+            if self._start.receives(arrival.key, arrival.payload):
+                return []
             return self._node.deliver(self._canonical(arrival.key), arrival.payload, arrival.arrival_ns)
+        if arrival.what == "alive":
+            self._start.somebody_came(arrival.arrival_ns)
         address = parse(arrival.key)
         if address is not None and isinstance(self._node, Estimator) and address.name in self._node.sources:
             if arrival.what == "gone":

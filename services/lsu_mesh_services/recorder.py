@@ -8,6 +8,7 @@ import secrets
 import socket
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from lsu_mesh.mesh.admission import Admission
@@ -18,6 +19,7 @@ from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
 from lsu_mesh_services.network.gap_recovery import GapRecovery
+from lsu_mesh_services.network.mesh_start import MeshStart
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part
@@ -40,44 +42,72 @@ def run_recorder(
     serve_port: int | None = None,
 ) -> int:
     """Record until told to stop, and let viewers follow on ``serve_port`` of the loopback; returns the exit code."""
-    clock = Clock()
+    clock, known_ns = Clock(), None
     template = record or configuration.recorder.path
     moment = time.strftime("%Y%m%d-%H%M%S")
     path = Path(template.replace("{mesh}", configuration.mesh.name).replace("{time}", moment))
-    was_restarted = os.environ.get("LSU_MESH_RESTARTS", "0") != "0"
-    part = next_part(path) if was_restarted else path
+    is_further = os.environ.get("LSU_MESH_RESTARTS", "0") != "0"
+    while True:
+        start = MeshStart(configuration, ROLE_NAME, ROLE_NAME, known_ns)
+        code = _record(start, next_part(path) if is_further else path, Session(settings, clock, stop, serve_port), path)
+        if code != OK or start.other_ns is None:
+            return code
+        known_ns, is_further = start.other_ns, True
+
+
+@dataclass(frozen=True)
+class Session:
+    """What a recorder needs besides its mesh and its file."""
+
+    settings: SessionSettings
+    clock: Clock
+    stop: Stop
+    serve_port: int | None
+
+
+def _record(start: MeshStart, part: Path, session: Session, path: Path) -> int:
+    """Write one part of a recording, until told to stop or until the mesh turns out to have another start."""
+    recorder: Recorder | None = None
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        recorder = Recorder(configuration, part, serve_port=serve_port, continues=path if part != path else None)
-    except OSError as error:
-        print(
-            f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record",
-            file=sys.stderr,
-        )
-        return COULD_NOT_START
-    try:
-        with Bus(settings, clock) as bus:
-            service = RecorderService(configuration, recorder, bus, clock)
+        with Bus(session.settings, session.clock) as bus:
+            started = start.configuration(bus, session.clock, lambda: bool(session.stop))
+            if started is None:
+                return OK
+            try:
+                part.parent.mkdir(parents=True, exist_ok=True)
+                continues = path if part != path else None
+                recorder = Recorder(started, part, serve_port=session.serve_port, continues=continues)
+            except OSError as error:
+                print(
+                    f"recorder: cannot write {path}: {error.strerror or error}; choose another place with --record",
+                    file=sys.stderr,
+                )
+                return COULD_NOT_START
+            service = RecorderService(started, recorder, bus, session.clock, start=start)
             service.declare()
             gc.collect()
             gc.freeze()  # as every peer does
             print(f"recorder: on the mesh, writing {part}", file=sys.stderr)
-            while not stop:
+            while not session.stop and start.other_ns is None:
                 service.turn()
             service.finish()
     finally:
-        recorder.close()
-        for problem in recorder.problems:
-            print(f"recorder: {problem}", file=sys.stderr, flush=True)
-        if not recorder.has_ended:
-            os._exit(FAILURE)  # Rerun's own clean-up at the end of a process would hang as well
+        if recorder is not None:
+            recorder.close()
+            for problem in recorder.problems:
+                print(f"recorder: {problem}", file=sys.stderr, flush=True)
+            if not recorder.has_ended:
+                os._exit(FAILURE)  # Rerun's own clean-up at the end of a process would hang as well
     return OK
 
 
 class RecorderService:
     """The loop around the recording: drain the queue, record, flush, tell its health."""
 
-    def __init__(self, configuration: Configuration, recorder: Recorder, bus: Bus, clock: Clock) -> None:
+    def __init__(
+        self, configuration: Configuration, recorder: Recorder, bus: Bus, clock: Clock, *, start: MeshStart
+    ) -> None:
+        self._start = start
         self._configuration = configuration
         self._recorder = recorder
         self._bus = bus
@@ -113,6 +143,7 @@ class RecorderService:
         now = self._clock.now()
         self._recovery.check(now, self._bus.waiting())
         self._recorder.tick(now)
+        self._start.check(self._bus, now)
         links = self._bus.links()
         if now >= self._next_health or links != self._links:
             self._links = links
@@ -142,6 +173,8 @@ class RecorderService:
 
     def _take(self, arrival: Arrival) -> None:
         if arrival.what == "sample":
+            if self._start.receives(arrival.key, arrival.payload):
+                return
             duplicates = self._admission.duplicates
             message = self._admission.admit(arrival.key, arrival.payload)
             if message is not None or self._admission.duplicates == duplicates:
@@ -149,6 +182,8 @@ class RecorderService:
             if isinstance(message, Health) and message.name != ROLE_NAME:
                 self._source_timeouts.received(message.name, arrival.arrival_ns)
             return
+        if arrival.what == "alive":
+            self._start.somebody_came(arrival.arrival_ns)
         address = parse(arrival.key)
         if address is not None:
             role = self._roles.get(address.name, "peer")

@@ -102,7 +102,7 @@ def test_what_needs_no_extra_says_so(line: str, monkeypatch: pytest.MonkeyPatch)
 @pytest.fixture
 def bare(lsu_mesh_command: list[str], tmp_path: Path) -> object:
     """Runs a command where no module of an extra can be imported."""
-    folder = without(RECORD.modules.values(), tmp_path / "blocked")
+    folder = without([*RECORD.modules.values(), *ROS2.modules.values()], tmp_path / "blocked")
     paths = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]).strip(os.pathsep)
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from lsu_mesh.mesh.config.problem import Problem, Problems
 from lsu_mesh.mesh.config.settings import MeshSettings, PlantSettings, SensorSettings
+from lsu_mesh.mesh.config.system import System
 from lsu_mesh.mesh.config.table import Table
 
 
@@ -51,18 +52,34 @@ def _table(root: Table, name: str) -> Mapping[str, object]:
 
 
 def check_external_plant(
-    plant: PlantSettings | None, sensors: Mapping[str, SensorSettings], input_count: int, problems: Problems
+    plant: PlantSettings | None, sensors: Mapping[str, SensorSettings], system: System, problems: Problems
 ) -> None:
     """A plant that is a program tells inputs only: of a model that has some, and nothing is simulated on it."""
-    if plant is None or not plant.is_external:
+    if plant is None or not plant.is_external or system.model is None:
         return
-    if input_count == 0:
+    if system.model.input_count == 0:
         text = 'is "external", but the model has no inputs that a program could send; remove [plant], or give [model] B'
         problems.add("plant", "source", text, expected="no [plant], or a model with inputs")
+    elif system.input_box is None:
+        text = 'is missing; a plant with source = "external" needs it: what acts before its first input is not known'
+        problems.add("model.input_box", "", text, expected="a box that holds every input")
+    if not system.is_continuous and any(sensor.D for sensor in sensors.values()):
+        text = (
+            'is "external", whose inputs begin within a step, and what an output with D sees then is not known of a '
+            "discrete model; set [model] continuous = true"
+        )
+        problems.add("plant", "source", text, expected="a continuous model, or no D")
     for name, sensor in sensors.items():
         if sensor.is_simulated:
             text = 'is simulated, but the plant is external and tells no state; set source = "external" or give a file'
             problems.add(f"sensors.{name}", "source", text, expected='"external", or "file"')
+
+
+def input_delay_ns(mesh: MeshSettings, plant: PlantSettings | None, declared_ns: int) -> int:
+    """How late in its step an input may begin; those of a program begin anywhere in it."""
+    if declared_ns or plant is None or not plant.is_external or mesh.exact_dt is None:
+        return declared_ns
+    return max(0, int(mesh.exact_dt * 10**9) - 1)
 
 
 def live_source_warnings(

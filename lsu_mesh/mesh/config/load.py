@@ -17,7 +17,12 @@ from lsu_mesh.mesh.config.exact_times import keep_digits, spell_out_dates
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.filters import kind_of, read_filter
 from lsu_mesh.mesh.config.fusion import check_learning, read_fusion, read_identifier, shared_sensor_warnings
-from lsu_mesh.mesh.config.live_sources import check_external_plant, live_source_warnings, settle_start
+from lsu_mesh.mesh.config.live_sources import (
+    check_external_plant,
+    input_delay_ns,
+    live_source_warnings,
+    settle_start,
+)
 from lsu_mesh.mesh.config.mesh_table import START_TIME, grid_of_table, read_mesh
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
 from lsu_mesh.mesh.config.overrides import apply, from_environment, from_flags
@@ -155,8 +160,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     _check_names(names, problems)
     check_reserved(network, names, problems)
     mesh = settle_start(mesh, root, plant, sensors=sensors)
-    input_count = 0 if model is None else model.input_count
-    check_external_plant(plant, sensors, input_count, problems)
+    check_external_plant(plant, sensors, system, problems)
     states = None if model is None else model.states
     check_ros2(network, sensors, [*filters, *fusion], states, problems=problems)
     files = [*(sensor.file for sensor in sensors.values()), None if plant is None else plant.file]
@@ -193,7 +197,10 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
                         problems.file,
                         sensors,
                         is_continuous=system.is_continuous,
-                        has_unknown_inputs=plant is None and input_count > 0 and input_box is None,
+                        has_unknown_inputs=plant is None
+                        and model is not None
+                        and model.input_count > 0
+                        and input_box is None,
                     ),
                 ),
             )
@@ -201,7 +208,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
         identifiers=dict(sorted(identifiers.items())),
         continuous=system.continuous,
         schedule=system.schedule,
-        input_delay_ns=system.input_delay_ns,
+        input_delay_ns=input_delay_ns(mesh, plant, system.input_delay_ns),
     )
 
 

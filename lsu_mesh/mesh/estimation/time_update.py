@@ -30,19 +30,23 @@ def predict_step(
 ) -> None:
     """Time update of the set of x(t_k) with u, and with ``earlier``, the input before it, where u may act late.
 
-    ``since``: the moment in ns at which u begins to act, if it is known; ``earlier`` acts till then.
+    ``since``: the moment in ns at which u begins to act, if it is known; ``earlier`` acts till then. A discrete model
+    is driven by one input for a whole step: by one of the box of both, where u begins within it.
 
     Raises what :meth:`Filter.predict` does.
     """
-    if configuration.has_one_model:
-        engine.predict(u)
+    acts_late = u is not None and configuration.input_delay_ns > 0
+    if not acts_late:
+        engine.predict(u, model=None if configuration.has_one_model else configuration.stretch_model(k))
         return
     flow = configuration.flow(k)
-    if flow is None or not configuration.input_delay_ns or not flow.input_count:
-        engine.predict(u, model=configuration.stretch_model(k))
-        return
     start, end = configuration.grid.time_of(k), configuration.grid.time_of(k + 1)
     before = configuration.input_box if earlier is None else earlier
     begins, delay = (start, configuration.input_delay_ns) if since is None else (since, 0)
     held = HeldInputs([begins], [u], before=before, delay_ns=delay)
-    carry(engine, flow, start, end_ns=end, inputs=held)
+    if flow is None:
+        engine.predict(
+            held.hull(start, end), model=None if configuration.has_one_model else configuration.stretch_model(k)
+        )
+    else:
+        carry(engine, flow, start, end_ns=end, inputs=held)

@@ -10,7 +10,7 @@ from lsu_mesh.mesh.messages import Measurement, Message
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.played_rows import PlayedRows
 from lsu_mesh.mesh.nodes.rate_limit import RateLimit
-from lsu_mesh.mesh.nodes.schedule import MAX_AT_ONCE, Schedule
+from lsu_mesh.mesh.nodes.schedule import MAX_AT_ONCE, GridSchedule, Schedule
 from lsu_mesh.mesh.nodes.sensor import listed
 from lsu_mesh.mesh.nodes.time_fields import time_fields
 
@@ -26,7 +26,7 @@ class FileSensorNode(Node):
     role = "sensor"
     publishes = PUBLISHES["sensor"]
 
-    def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
+    def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule | GridSchedule) -> None:
         super().__init__(configuration, name, boot)
         self._rows = PlayedRows(configuration, name)
         self._size = len(configuration.sensors[name].C)

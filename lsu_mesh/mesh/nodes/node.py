@@ -98,7 +98,7 @@ class Node(ABC):
 
     def deliver(self, address: str, payload: bytes, now: int) -> list[Message]:
         """Admission and :meth:`receive`."""
-        message = self.admission.admit(address, payload)
+        message = self.admission.admit(address, payload, now)
         return [] if message is None else self.receive(message, now)
 
     def tick(self, now: int) -> list[Message]:

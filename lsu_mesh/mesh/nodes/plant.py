@@ -11,7 +11,7 @@ from lsu_mesh.mesh.messages import Input, Message, Truth
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.plant_course import PlantCourse
 from lsu_mesh.mesh.nodes.rate_limit import RateLimit
-from lsu_mesh.mesh.nodes.schedule import MAX_AT_ONCE, Schedule
+from lsu_mesh.mesh.nodes.schedule import MAX_AT_ONCE, GridSchedule, Schedule
 
 PAST_SECONDS, LEAST_PAST = 30.0, 256
 """So much of the past, and so many steps, a plant that starts late publishes the inputs of: filters need every one."""
@@ -31,7 +31,7 @@ class PlantNode(Node):
     role = "plant"
     publishes = PUBLISHES["plant"]
 
-    def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule) -> None:
+    def __init__(self, configuration: Configuration, name: str, boot: str, schedule: Schedule | GridSchedule) -> None:
         super().__init__(configuration, name, boot)
         self._course = PlantCourse(configuration)
         self._tells_truth = truth_is_known(configuration)

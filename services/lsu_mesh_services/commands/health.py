@@ -16,6 +16,7 @@ from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
 from lsu_mesh_services.bus import Bus, Clock
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
+from lsu_mesh_services.network.mesh_start import find_start
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.session import session_settings, with_session
 
@@ -39,9 +40,11 @@ def _tell(configuration: Configuration, options: argparse.Namespace) -> int:
 
 def _listen(configuration: Configuration, options: argparse.Namespace) -> list[PeerHealth]:
     """Heartbeats and liveliness of so many seconds, judged at their end."""
-    clock, admission, mesh = Clock(), Admission(configuration, ("health",)), configuration.mesh.name
+    clock, mesh = Clock(), configuration.mesh.name
     observer = HealthObserver(configuration, clock.now())
     with Bus(session_settings(configuration, options), clock) as bus:
+        configuration = find_start(configuration, bus, clock, options.seconds) or configuration.started(0)
+        admission = Admission(configuration, ("health",))
         bus.subscribe(f"{PREFIX}/{mesh}/health/*")
         bus.watch_alive(key(mesh, "live", "*"))
         end = clock.now() + int(options.seconds * SECOND)

@@ -12,7 +12,7 @@ from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.nodes.node import Node
-from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.nodes.schedule import GridSchedule, Schedule
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import USAGE
 from lsu_mesh_services.session import session_settings, with_session
@@ -29,6 +29,17 @@ def main(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
         return USAGE
+    if configuration.is_external(options.role, options.name):
+        print(
+            f"{configuration.path}: {options.role} {options.name} is external: a program of yours sends what it "
+            f"publishes; try: lsu-mesh publish {options.name} -c {configuration.path}",
+            file=sys.stderr,
+        )
+        return USAGE
+    if configuration.mesh.is_live and isinstance(getattr(options, "start_at", None), int):
+        text = "[mesh] is live, and its steps are due at start_time + k dt; leave out --start-at, or give start_time"
+        print(f"{configuration.path}: {text}", file=sys.stderr)
+        return USAGE
     return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
 
 
@@ -38,18 +49,23 @@ def _run(configuration: Configuration, options: argparse.Namespace) -> int:
         from lsu_mesh_services.recorder import run_recorder
 
         return run_recorder(configuration, options.record, settings, stop=options.stop, serve_port=options.serve)
-    try:
-        node = make_node(configuration, options)
-    except LsuMeshError as error:  # its file, which nobody else reads whole, or what it cannot do with this mesh
-        print(error, file=sys.stderr)
-        return USAGE
-    from lsu_mesh_services.peer import run_node
+    from lsu_mesh_services.peer import run_peer
 
-    return run_node(node, settings, options.stop)
+    def make(started: Configuration) -> Node | None:
+        try:
+            return make_node(started, options)
+        except LsuMeshError as error:  # its file, which nobody else reads whole, or what it cannot do with this mesh
+            print(error, file=sys.stderr)
+            return None
+
+    return run_peer(configuration, (options.role, options.name), make, settings=settings, stop=options.stop)
 
 
-def _schedule(options: argparse.Namespace, rate: float) -> Schedule:
-    """Now, at the time given, or when standard input says it."""
+def _schedule(configuration: Configuration, options: argparse.Namespace) -> Schedule | GridSchedule:
+    """By the clock where the mesh is live, else from now, from the time given, or from when standard input says it."""
+    if configuration.mesh.is_live:
+        return GridSchedule(configuration.grid)
+    rate = configuration.mesh.rate
     if options.start_at != "-":
         return Schedule(time.time_ns() if options.start_at is None else options.start_at, rate)
     schedule = Schedule(None, rate)
@@ -67,7 +83,7 @@ def make_node(configuration: Configuration, options: argparse.Namespace) -> Node
     """The node of a role and name."""
     name, boot = options.name, secrets.token_hex(8)
     if options.role in ("plant", "sensor"):
-        schedule = _schedule(options, configuration.mesh.rate)
+        schedule = _schedule(configuration, options)
         if options.role == "plant":
             from lsu_mesh.mesh.nodes.plant import PlantNode
 

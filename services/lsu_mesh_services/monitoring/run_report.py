@@ -128,6 +128,8 @@ class RunReport:
         self.source_steps: dict[str, int] = {}
         self.links: dict[str, int] = {}
         """How many others each peer is connected to."""
+        self.used: set[str] = set()
+        """Names of those whose messages went into an estimate."""
 
     def deliver(self, key: str, payload: bytes, arrival_ns: int) -> None:
         """Take a payload as it came."""
@@ -172,6 +174,7 @@ class RunReport:
                 lower=message.lower,
                 upper=message.upper,
             )
+        self.used.update(reference[1].rpartition("/")[2] for reference in message.used)
         if message.status == "inconsistent":
             track.inconsistent.add(step)
         truth = self._truth.get(step)

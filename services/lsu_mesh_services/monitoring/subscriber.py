@@ -18,6 +18,7 @@ from lsu_mesh_services.bus import Bus, Clock
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, USAGE
 from lsu_mesh_services.network.addresses import Addresses, WrongAddress
+from lsu_mesh_services.network.mesh_start import find_start
 from lsu_mesh_services.session import session_settings, with_session
 from lsu_mesh_services.stop import Stop
 
@@ -115,7 +116,13 @@ def watching(configuration: Configuration, options: argparse.Namespace) -> Itera
                     "or give its address with -e ENDPOINT"
                 )
             bus.next(0.02)
-        yield Watch(configuration, bus, clock, stop)
+        started = find_start(configuration, bus, clock, LINK_S)
+        if started is None:
+            raise NobodyThere(
+                f"mesh {configuration.mesh.name!r} has not started yet: no filter or fusion tells its start; "
+                "start it with `lsu-mesh run`"
+            )
+        yield Watch(started, bus, clock, stop)
 
 
 def run_tool(options: argparse.Namespace, work: Callable[[Configuration, argparse.Namespace], int]) -> int:

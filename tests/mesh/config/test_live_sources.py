@@ -139,3 +139,15 @@ def test_an_external_plant_needs_inputs(tmp_path: Path) -> None:
 )
 def test_what_will_not_work_is_warned_of(tmp_path: Path, change: tuple[str, str], words: str) -> None:
     assert any(words in str(warning) for warning in read(tmp_path, MESH.replace(*change, 1)).warnings)
+
+
+def test_inputs_of_a_program_begin_anywhere_in_their_step(tmp_path: Path) -> None:
+    plant = MESH.replace("[sensors.gauge]", '[plant]\nsource = "external"\n[sensors.gauge]')
+    assert read(tmp_path, plant).input_delay_ns == 10**8 - 1
+    assert read(tmp_path, plant, 'model.input_delay="5ms"').input_delay_ns == 5_000_000
+    discrete = plant.replace("continuous = true", "").replace("r = [0.5]", "r = [0.5]\nrate = [9.0]")
+    assert read(tmp_path, discrete).input_delay_ns == 10**8 - 1
+    box = "[model.input_box]\nlower = [-1.0]\nupper = [1.0]\n"
+    assert any("what acts before its first input" in one for one in mistakes(tmp_path, plant.replace(box, "")))
+    seen = discrete.replace("rate = [9.0]", "rate = [9.0]\nD = [[1.0]]")
+    assert any("what an output with D sees then is not known" in one for one in mistakes(tmp_path, seen))
