@@ -127,6 +127,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("session", "configuration"),
         ("recording", "monitoring"),
         ("viewers", "peer", "recorder", "played_files", "new_mesh"),
+        ("ros2",),
         ("mesh_launcher",),
         ("replay",),
         ("commands",),
