@@ -79,6 +79,28 @@ def _described(node: Any) -> str:
     return f"a list of {_described(about[0]).removeprefix('a ')}"
 
 
+def numbers_of(store: Typestore, type_name: str) -> list[str]:
+    """Paths to all numbers of a type; of a list, the one to its first entry."""
+    found: list[str] = []
+    _find_numbers(store, ("", type_name), found)
+    return found
+
+
+def _find_numbers(store: Typestore, at: tuple[str, str], found: list[str]) -> None:
+    from rosbags.interfaces import Nodetype
+
+    before, type_name = at
+    fields: Any = store.fielddefs[type_name][1]
+    for name, (kind, about) in fields:
+        path = f"{before}{name}"
+        if kind in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+            path, (kind, about) = f"{path}[0]", about[0]
+        if kind == Nodetype.NAME:
+            _find_numbers(store, (f"{path}.", about), found)
+        elif kind == Nodetype.BASE and _NUMBERS.fullmatch(about[0]):
+            found.append(path)
+
+
 def compile_path(text: str) -> Callable[[Any], Any]:
     """A function that takes a message and returns what the path leads to; IndexError beyond the end of a list."""
     path = parse_path(text)
