@@ -131,9 +131,7 @@ class Admission:
         ``now``: the receiver's clock in ns since 1970, by which times of live sources are judged; None: they are not.
         """
         try:
-            message, unknown = self._checked(key, payload)
-            if now is not None and isinstance(message, Measurement | Input):
-                check_live_time(self._configuration, message, now)
+            message, unknown = self._checked(key, payload, now)
             if not self._is_new(key, message):
                 self.duplicates += 1
                 return None
@@ -179,7 +177,7 @@ class Admission:
             if name in self.unknown_fields or len(self.unknown_fields) < MAX_NAMES:
                 self.unknown_fields[name] += 1
 
-    def _checked(self, key: str, payload: bytes) -> tuple[Message, tuple[str, ...]]:
+    def _checked(self, key: str, payload: bytes, now: int | None) -> tuple[Message, tuple[str, ...]]:
         address = parse(key)
         if address is None or address.mesh != self._mesh or address.topic not in self._topics:
             raise Refused("key", "not a key that this peer listens to")
@@ -191,6 +189,8 @@ class Admission:
             raise Refused("unknown", f"the configuration has no {role} {address.name!r}")
         if message.model != self._digest:
             raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
+        if now is not None and isinstance(message, Measurement | Input):
+            check_live_time(self._configuration, message, now)
         self._check_shape(address.name, message)
         if isinstance(message, Measurement):
             message = placed(self._configuration, message)

@@ -42,7 +42,7 @@ def placed(configuration: Configuration, message: Measurement) -> Measurement:
         )
         raise Refused("off the grid", text)
     last = configuration.mesh.steps
-    if last is not None and k > last + 1:
+    if last is not None and k > last:
         raise Refused("step", f"step {k} of a mesh that ends at step {last}")
     return message if message.step == k else structs.replace(message, step=max(0, k))
 

@@ -144,8 +144,7 @@ class Message(_Strict, frozen=True, kw_only=True):
     src: Text
     boot: str
     seq: Count
-    step: Count = 0
-    """k; 0 where it is not of a step: a measurement with a time of its own, which the mesh puts on its step."""
+    step: Count
     sent_ns: Count
     origin_ns: Count
     model: Annotated[str, Meta(max_length=64)]
@@ -195,6 +194,8 @@ class Measurement(Message, frozen=True, kw_only=True):
     """Measured outputs of one sensor; nil is a missing entry."""
 
     topic = "measurement"
+    step: Count = 0
+    """k; 0, or nothing: the mesh puts it on the step of its time."""
     y: Annotated[list[float | None], Meta(max_length=4096)]
     time_ns: Count
     time_error_ns: Count | None = None

@@ -17,6 +17,7 @@ from lsu_mesh.mesh.nodes.node import SECOND
 Level = Literal["OK", "WARN", "ERROR", "STALE"]
 LEVELS: tuple[Level, ...] = ("OK", "WARN", "ERROR", "STALE")
 """From best to worst."""
+NO_WORD = "external, and tells no health: whether its data come stands in the health of those who use them"
 STALE_NS = 3 * SECOND
 """A peer that has sent no heartbeat for so long, three times its period, is stale."""
 
@@ -58,6 +59,7 @@ class HealthObserver:
 
     def __init__(self, configuration: Configuration, now: int) -> None:
         self._roles = {name: role for role, name in configuration.peers()}
+        self._external = {name for role, name in configuration.peers() if configuration.is_external(role, name)}
         self._began = now
         self._received_at: dict[str, _Heard] = {}
         self._gone: set[str] = set()
@@ -90,6 +92,8 @@ class HealthObserver:
 
     def _judged(self, name: str, now: int) -> PeerHealth:
         heard = self._received_at.get(name)
+        if heard is None and name in self._external and name not in self._gone:
+            return PeerHealth(name, self._roles[name], "OK", (NO_WORD,))
         if heard is None:
             waited = now - self._began
             is_late = waited >= STALE_NS or name in self._gone

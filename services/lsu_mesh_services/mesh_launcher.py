@@ -15,9 +15,9 @@ from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.configuration import DEMO, flags
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
+from lsu_mesh_services.mesh_start import moment_text
 from lsu_mesh_services.monitoring.run_report import RunReport
 from lsu_mesh_services.monitoring.table import Progress, print_json, print_table
-from lsu_mesh_services.network.mesh_start import moment_text
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.network.security import certificates, check_endpoints
 from lsu_mesh_services.played_files import accounts_or_explain, last_step

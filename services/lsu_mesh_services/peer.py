@@ -19,8 +19,8 @@ from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import OK, USAGE
+from lsu_mesh_services.mesh_start import MeshStart, moment_text
 from lsu_mesh_services.network.gap_recovery import GapRecovery
-from lsu_mesh_services.network.mesh_start import MeshStart, moment_text
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.stop import Stop
 

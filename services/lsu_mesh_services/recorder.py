@@ -18,8 +18,8 @@ from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
+from lsu_mesh_services.mesh_start import MeshStart
 from lsu_mesh_services.network.gap_recovery import GapRecovery
-from lsu_mesh_services.network.mesh_start import MeshStart
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part
@@ -123,9 +123,12 @@ class RecorderService:
         self._queue = self._longest_ns = 0
         """The longest queue and turn since the last health message."""
         self._roles = {name: role for role, name in configuration.peers()}
-        others = [name for name in self._roles if name != ROLE_NAME]
+        others = [
+            name for role, name in configuration.peers()
+            if name != ROLE_NAME and not configuration.is_external(role, name)
+        ]  # fmt: skip
         self._source_timeouts = SourceTimeouts(configuration, [("health", name) for name in others], others)
-        """Everybody tells its health every second; of whom nothing is heard, nothing is recorded."""
+        """Every peer of the mesh tells its health every second; of whom nothing is heard, nothing is recorded."""
 
     def declare(self) -> None:
         """Subscribe to all topics, watch the peers, show that the recorder is there."""

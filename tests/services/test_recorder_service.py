@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lsu_mesh_services.mesh_start import MeshStart
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recorder import RecorderService
 
@@ -78,7 +79,7 @@ def configuration(demo: Path) -> Configuration:
 def test_a_peer_of_which_nothing_is_heard_is_named_and_forgiven(configuration: Configuration) -> None:
     line, disk, watch = Line(), Disk(), Watch()
     parts: Any = (disk, line, watch)
-    service = RecorderService(configuration, *parts)
+    service = RecorderService(configuration, *parts, start=MeshStart(configuration, "recorder", "recorder"))
     others = [(role, name) for role, name in configuration.peers() if role != "recorder"]
     counts = dict.fromkeys((name for _, name in others), 0)
 
@@ -108,7 +109,7 @@ def test_it_tells_when_and_where_it_was_started(configuration: Configuration) ->
     line, watch = Line(), Watch()
     parts: Any = (Disk(), line, watch)
     began = watch.time
-    service = RecorderService(configuration, *parts)
+    service = RecorderService(configuration, *parts, start=MeshStart(configuration, "recorder", "recorder"))
     watch.time += 5 * SECOND
     service.turn()
     assert (line.published[-1].started_ns, line.published[-1].host) == (began, socket.gethostname())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import TYPES, Message, read
@@ -31,6 +33,8 @@ class Reader:
     """Reads everything that is published as a receiver would: what it refuses no receiver would ever get."""
 
     def __init__(self, configuration: Configuration, decoder: SharedDecoder) -> None:
+        if configuration.mesh.is_live:  # wrong clocks say times after the end: it is the receivers who refuse them
+            configuration = replace(configuration, mesh=replace(configuration.mesh, steps=None))
         self._admission = Admission(configuration, TYPES)
         self._admission.decoder = decoder.read
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.simulator.external_sensor import ClockStep
 
+START_NS = 10_000 * SECOND
+"""True time at which step 1 is due; far from zero, so that no wrong clock is negative."""
 MESSAGE_FAULTS = ("drop", "delay", "duplicate", "reorder", "corrupt")
 FAULTS = (*MESSAGE_FAULTS, "partition", "freeze", "kill", "skew")
 HIGHEST_RATE = {"drop": 0.15, "delay": 0.1, "duplicate": 0.1, "reorder": 0.2, "corrupt": 0.04}
@@ -49,6 +52,8 @@ class FaultPlan:
     freezes: Sequence[Outage] = ()
     kills: Sequence[Outage] = ()
     skews: dict[str, Skew] = field(default_factory=dict)
+    clock_steps: Mapping[str, Sequence[ClockStep]] = field(default_factory=dict)
+    """Of external sensors."""
 
     @property
     def total_rate(self) -> float:

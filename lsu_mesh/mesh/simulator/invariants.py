@@ -76,6 +76,8 @@ class Invariants:
         self.health: dict[str, Health] = {}
         self.sets = 0
         """Published sets that were checked."""
+        self.untrue_times = 0
+        """Data that a node refused because its clock says that their time cannot be true."""
 
     def began(self, node: Node) -> None:
         """A process has started."""

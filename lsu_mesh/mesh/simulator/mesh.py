@@ -15,17 +15,16 @@ from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import SECOND, Node
 from lsu_mesh.mesh.nodes.plant import PlantNode
-from lsu_mesh.mesh.nodes.schedule import Schedule
+from lsu_mesh.mesh.nodes.schedule import GridSchedule, Schedule
 from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
 from lsu_mesh.mesh.simulator.decoding import Reader, SharedDecoder
-from lsu_mesh.mesh.simulator.faults import FaultPlan, Skew
+from lsu_mesh.mesh.simulator.external_sensor import ExternalSensor
+from lsu_mesh.mesh.simulator.faults import START_NS, FaultPlan, Skew
 from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.recorder import RecorderSink
 from lsu_mesh.mesh.simulator.transport import MILLISECOND, Links, Port, Transport
 
 MAX_WAIT_NS = SECOND // 10
-START_NS = 1_000 * SECOND
-"""True time at which step 1 is due; far from zero, so that no skewed clock is negative."""
 LAST_ANSWERED = 0.7
 """Chance that the question for the last own posterior, asked at the start of a process, finds somebody."""
 
@@ -121,7 +120,10 @@ class Process:
 
     def _take(self, arrival: Arrival) -> list[Message]:
         """What ``Node.deliver`` does, with the witness between admission and node."""
-        message = self.node.admission.admit(arrival.key, arrival.payload)
+        refused = self.node.admission.refused
+        before = refused["future"] + refused["past"]
+        message = self.node.admission.admit(arrival.key, arrival.payload, arrival.at)
+        self._mesh.witness.untrue_times += refused["future"] + refused["past"] - before
         if message is None:
             return []
         self._mesh.witness.admitted(self.node, message)
@@ -200,7 +202,13 @@ class SimulatedMesh:
 
     def _made(self, role: str, name: str, boot: str) -> Node:
         if role == "plant":
-            return PlantNode(self.configuration, name, boot, Schedule(START_NS, self.configuration.mesh.rate))
+            is_live, rate = self.configuration.mesh.is_live, self.configuration.mesh.rate
+            schedule = GridSchedule(self.configuration.grid) if is_live else Schedule(START_NS, rate)
+            return PlantNode(self.configuration, name, boot, schedule)
+        if role == "sensor" and self.configuration.sensors[name].is_live:
+            steps = self._plan.clock_steps.get(name, ())
+            last = (self.configuration.mesh.steps or 0) + 1
+            return ExternalSensor(self.configuration, name, boot, clock_steps=steps, steps=last)
         if role == "sensor":
             return SimulatedSensorNode(self.configuration, name, boot)
         if role == "filter":

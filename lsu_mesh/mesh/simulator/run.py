@@ -6,7 +6,7 @@ import functools
 import random
 import traceback
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Posterior
 from lsu_mesh.mesh.nodes.plant_course import PlantCourse
 from lsu_mesh.mesh.simulator.broken import InvariantBroken
+from lsu_mesh.mesh.simulator.external_sensor import draw_clock_steps
 from lsu_mesh.mesh.simulator.faults import FaultPlan, draw_plan
 from lsu_mesh.mesh.simulator.invariants import Invariants
 from lsu_mesh.mesh.simulator.mesh import SimulatedMesh
@@ -31,6 +32,8 @@ JUDGED_STEPS = 20
 WIDEST, WIDEST_SMALL = 1.05, 1.5
 """A fused set may then be so much wider than without faults: in the mesh as it is, and with small constrained
 zonotopes, whose size hangs on what was reduced when, for as long as anything of it is remembered."""
+WIDEST_LIVE = 3.0
+"""Sensors that measure when they like measure at other moments after a restart."""
 AFTERMATH = 10
 """Steps of time after the last step, in which deadlines pass."""
 
@@ -66,13 +69,14 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
     last_faulty = max(steps // 2, steps - RECOVERY_STEPS - JUDGED_STEPS)
     begin, end = (SimulatedMesh.start_time(configuration, step) for step in (0, last_faulty))
     plan = draw_plan(rng, faults, configuration.peers(), begin=begin, end=end)
+    plan = with_wrong_clocks(plan, configuration, random.Random(f"{seed}/clocks"), begin=begin) if faults else plan
     mesh = SimulatedMesh(configuration, plan, rng, witness)
     broken = ""
     try:
         mesh.run(steps + AFTERMATH)
         if steps - last_faulty >= RECOVERY_STEPS + JUDGED_STEPS:
             widths = fault_free_widths(file, steps, trajectory, variant)
-            _check_end(configuration, witness, widths, WIDEST_SMALL if variant.kinds else WIDEST)
+            _check_end(configuration, witness, widths, _widest(configuration, variant))
     except InvariantBroken as error:
         broken = str(error)
     except Exception as error:  # a node that dies of a message is a finding, not the end of the campaign
@@ -80,8 +84,30 @@ def run_seed(file: Path, seed: int, steps: int, faults: Collection[str]) -> Outc
     counts = mesh.transport.counts | {
         "partition": len(plan.partitions), "freeze": len(plan.freezes), "kill": len(plan.kills),
         "skew": len(plan.skews),
+        "clock step": sum(map(len, plan.clock_steps.values())),
+        "untrue time": witness.untrue_times,
     }  # fmt: skip
     return Outcome(seed=seed, steps=steps, broken=broken, sets=witness.sets, counts=counts, variant=str(variant))
+
+
+def _widest(configuration: Configuration, variant: Variant) -> float:
+    if configuration.mesh.is_live:
+        return WIDEST_LIVE
+    return WIDEST_SMALL if variant.kinds else WIDEST
+
+
+def with_wrong_clocks(plan: FaultPlan, configuration: Configuration, rng: random.Random, *, begin: int) -> FaultPlan:
+    """The plan with clocks of external sensors that jump; other clocks then err by less than is believed."""
+    live = {name for name, sensor in configuration.sensors.items() if sensor.is_live}
+    if not live:
+        return plan
+    believed = configuration.mesh.future_ns // 2
+    skews = {
+        name: replace(skew, offset=max(-believed, min(believed, skew.offset)))
+        for name, skew in plan.skews.items()
+        if name not in live
+    }
+    return replace(plan, skews=skews, clock_steps=draw_clock_steps(rng, live, begin, plan.end))
 
 
 @functools.lru_cache(maxsize=512)

@@ -35,7 +35,7 @@ MARGIN = 1.01
 def draw_times(rng: random.Random, base: Configuration) -> str:
     """One of :data:`TIMES`, or nothing."""
     goes_by_steps = any(one.kind == WINDOWED or one.adopt for one in base.filters.values()) or base.identifiers
-    if goes_by_steps or rng.random() < ON_THE_GRID:
+    if goes_by_steps or base.mesh.is_live or rng.random() < ON_THE_GRID:
         return ""
     has_grid_only = base.has_one_model
     ways = [way for way in TIMES if has_grid_only or way not in ("rates", "schedule", "continuous")]

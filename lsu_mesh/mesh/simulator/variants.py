@@ -17,6 +17,8 @@ from typing import Any, NamedTuple
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.config.settings import FilterSettings, ScheduledModel, TransferWay
+from lsu_mesh.mesh.simulator.external_sensor import with_simulated_plant
+from lsu_mesh.mesh.simulator.faults import START_NS
 from lsu_mesh.mesh.simulator.time_variants import GRID_TIMES, timed, with_flow
 from lsu_mesh.supports.orthotope import Orthotope
 
@@ -85,7 +87,11 @@ def _draw_kind(rng: random.Random, kind: str) -> str:
 @functools.lru_cache(maxsize=512)
 def configured(file: Path, steps: int, mesh_seed: int, variant: Variant) -> Configuration:
     """The configuration of a run."""
-    base = load(file, (f"mesh.steps={steps}", f"mesh.seed={mesh_seed}", f"mesh.rate={RATE}"))
+    base = load(file, (f"mesh.steps={steps}", f"mesh.seed={mesh_seed}"))
+    if base.mesh.is_live:
+        base = with_simulated_plant(base, START_NS - base.grid.time_of(1) + base.grid.start_ns)
+    else:
+        base = load(file, (f"mesh.steps={steps}", f"mesh.seed={mesh_seed}", f"mesh.rate={RATE}"))
     if not variant.kinds:
         return base
     small: dict[str, Any] = {

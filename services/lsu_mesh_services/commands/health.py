@@ -16,7 +16,7 @@ from lsu_mesh.mesh.observer import HealthObserver, PeerHealth, worst
 from lsu_mesh_services.bus import Bus, Clock
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
-from lsu_mesh_services.network.mesh_start import find_start
+from lsu_mesh_services.mesh_start import find_start
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.session import session_settings, with_session
 

@@ -34,8 +34,13 @@ def main(options: argparse.Namespace) -> int:
     except ConfigurationError as error:
         print_problems(error)
         return USAGE
-    if configuration.plant is None or any(sensor.file or sensor.faults for sensor in configuration.sensors.values()):
-        print(f"{path}: needs a simulated plant, and sensors that are simulated and do not lie", file=sys.stderr)
+    sensors = configuration.sensors.values()
+    has_plant = configuration.plant is not None or any(sensor.is_live for sensor in sensors)
+    if not has_plant or any(sensor.file or sensor.faults for sensor in sensors):
+        print(
+            f"{path}: needs a simulated plant or external sensors, and sensors that play no file and do not lie",
+            file=sys.stderr,
+        )
         return USAGE
     if options.steps < 1 or options.seeds < 1:
         print("--steps and --seeds count from 1", file=sys.stderr)

@@ -17,8 +17,8 @@ from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh_services.bus import Bus, Clock
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, USAGE
+from lsu_mesh_services.mesh_start import find_start
 from lsu_mesh_services.network.addresses import Addresses, WrongAddress
-from lsu_mesh_services.network.mesh_start import find_start
 from lsu_mesh_services.session import session_settings, with_session
 from lsu_mesh_services.stop import Stop
 
