@@ -94,6 +94,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("estimation",),
         ("nodes",),
         ("observer", "replay", "verification"),
+        ("ros2_telling",),
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [

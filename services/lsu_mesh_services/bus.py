@@ -140,12 +140,13 @@ class Bus:
 
         self._declared.append(self._session.declare_subscriber(key, came))
 
-    def put(self, key: str, payload: bytes, attachment: bytes | None) -> None:
-        """Send to those who listen now, as programs do that know nothing of the mesh."""
-        if key not in self._publishers:
-            self._publishers[key] = self._session.declare_publisher(
-                key, congestion_control=zenoh.CongestionControl.DROP
-            )
+    def announce_plain(self, key: str) -> None:
+        """Declare a publisher for programs that know nothing of the mesh."""
+        drop = zenoh.CongestionControl.DROP
+        self._publishers[key] = self._session.declare_publisher(key, congestion_control=drop)
+
+    def put_plain(self, key: str, payload: bytes, attachment: bytes | None) -> None:
+        """Send to those who listen now, by a publisher of :meth:`announce_plain`."""
         self._publishers[key].put(payload, attachment=attachment)
 
     def watch_tokens(self, key: str, there: str, gone: str) -> None:

@@ -12,6 +12,7 @@ from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE
 from lsu_mesh_services.extras import refusal
 from lsu_mesh_services.options import (
     bench,
+    bridge,
     doctor,
     graph,
     health,
@@ -46,6 +47,7 @@ GROUPS = (
     view,
     replay,
     recording,
+    bridge,
     simulate,
     identify,
     reproduce,

@@ -50,7 +50,9 @@ def test_the_page_lists_exactly_the_fields_of_a_topic(page: str, topic: str) -> 
     listed = documented(page, f"`{topic}`")
     if topic == "fused":
         listed |= documented(page, "`posterior`")
-    assert listed == (fields - common) | (common & set(defaults(topic))), "and common fields with a default of their own"
+    assert listed == (fields - common) | (common & set(defaults(topic))), (
+        "and common fields with a default of their own"
+    )
     assert documented(page, "Common fields") == common
 
 

@@ -28,6 +28,7 @@ NEEDS = (
         f"recording merge {FILE}", f"recording export {FILE} --format parquet", f"identify m.toml --recording {FILE}",
         "bench recording",
     )),
+    (ROS2, ("import drive.mcap", "bridge ros2")),
 )  # fmt: skip
 NONE = (
     "validate m.toml",

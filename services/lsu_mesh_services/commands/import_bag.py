@@ -49,7 +49,9 @@ def _listed(bag: Bag) -> int:
 
 def _described(bag: Bag, topic: Topic) -> int:
     """The fields of a type, when none is named."""
-    print(f"{topic.name}: {topic.messages} messages of {topic.type}; choose numbers by --fields A,B of", file=sys.stderr)
+    print(
+        f"{topic.name}: {topic.messages} messages of {topic.type}; choose numbers by --fields A,B of", file=sys.stderr
+    )
     print("\n".join(bag.fields(topic)))
     return OK
 
