@@ -122,6 +122,8 @@ class Admission:
         """Messages let in without fields that are unknown here."""
         self.unknown_fields: Counter[str] = Counter()
         """By topic and field, such as ``posterior.support.colour``."""
+        self.stood_still = False
+        """Whether what comes now has waited while this process stood still."""
         self.decoder: Callable[[str, bytes], tuple[Message, tuple[str, ...]]] = read
         """What makes messages of payloads; many receivers in one process may share one with a memory."""
 
@@ -150,10 +152,12 @@ class Admission:
         return sum(sequence.gaps for sequence in self._sequences.values())
 
     def gaps_by_key(self) -> dict[str, int]:
-        """The same by key, without the keys that lack nothing."""
+        """The same by key, without the keys that lack nothing, and without live ones: those are asked of no cache."""
         gaps: Counter[str] = Counter()
         for (key, _), sequence in self._sequences.items():
-            if sequence.gaps:
+            address = parse(key)
+            is_live = address is not None and self._configuration.is_live(address.topic, address.name)
+            if sequence.gaps and not is_live:
                 gaps[key] += sequence.gaps
         return dict(gaps)
 
@@ -190,7 +194,7 @@ class Admission:
         if message.model != self._digest:
             raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
         if now is not None and isinstance(message, Measurement | Input):
-            check_live_time(self._configuration, message, now)
+            check_live_time(self._configuration, message, now, has_waited=self.stood_still)
         self._check_shape(address.name, message)
         if isinstance(message, Measurement):
             message = placed(self._configuration, message)

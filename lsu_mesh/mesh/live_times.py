@@ -2,6 +2,9 @@
 
 A sensor whose clock is an hour ahead would move everybody to steps that are not there yet, and one whose clock is
 behind would tell of moments at which it did not measure. Neither may reach a set.
+
+The clock judges only what comes when it is sent. What a clock that was ten seconds ahead has stamped looks true ten
+seconds later; so nobody takes live data from caches, and a process that stood still takes none that waited for it.
 """
 
 from __future__ import annotations
@@ -25,18 +28,22 @@ def ahead_ns(configuration: Configuration, message: Measurement | Input, now: in
     return (configuration.grid.time_of(message.step) if message.time_ns is None else message.time_ns) - now
 
 
-def check_live_time(configuration: Configuration, message: Measurement | Input, now: int) -> None:
-    """Refuse a live datum from the future, or from too long ago.
+def check_live_time(
+    configuration: Configuration, message: Measurement | Input, now: int, *, has_waited: bool = False
+) -> None:
+    """Refuse a live datum from the future, from too long ago, or one that ``has_waited`` for the receiver.
 
     Raises
     ------
     Refused
         ``future``: its earliest moment lies more than ``[mesh] future`` ahead of the receiver's clock. ``past``: its
-        latest moment lies more than ``[mesh] past`` behind it.
+        latest moment lies more than ``[mesh] past`` behind it. ``waited``: nobody knows how long ago it came.
     """
     ahead = ahead_ns(configuration, message, now)
     if ahead is None:
         return
+    if has_waited:
+        raise Refused("waited", f"{message.name} sent it while this process stood still; its time cannot be judged")
     error = (message.time_error_ns or 0) if isinstance(message, Measurement) else 0
     mesh = configuration.mesh
     if ahead - error > mesh.future_ns:

@@ -25,6 +25,8 @@ from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
+STANDSTILL_NS = 1_000_000_000
+"""So long between two turns of the loop, and the process stood still; so long after it, live data are not believed."""
 MAX_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
@@ -115,6 +117,7 @@ class Peer:
         self._mesh = node.configuration.mesh.name
         self._links = -1
         self._next_look = 0
+        self._turned_at, self._settled_at = clock.now(), 0
         self._measured_until = self._worst_queue = self._worst_ns = self._worst_age_ns = 0
         self._recovery = GapRecovery(node.admission, bus.ask_cache)
 
@@ -123,7 +126,8 @@ class Peer:
         for topic in (*self._node.publishes, "health", "event"):
             self._bus.announce(key(self._mesh, topic, self._node.name))
         for topic, name in self._node.subscriptions():
-            self._bus.subscribe(key(self._mesh, topic, name))
+            is_live = self._node.configuration.is_live(topic, name)
+            (self._bus.subscribe_live if is_live else self._bus.subscribe)(key(self._mesh, topic, name))
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", self._node.name))
         if isinstance(self._node, FilterNode):
@@ -166,6 +170,7 @@ class Peer:
         """Wait for something to do, then do all of it."""
         self._watch_links()
         self._start.check(self._bus, self._clock.now())
+        self._look_for_standstill(self._clock.now())
         self._recovery.check(self._clock.now(), self._bus.waiting())
         arrival = self._bus.next(self._patience())
         began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
@@ -191,6 +196,13 @@ class Peer:
             "dropped": float(self._bus.dropped),
             "step_ms": self._worst_ns * 1e-6,
         }
+
+    def _look_for_standstill(self, now: int) -> None:
+        """A process that was stopped cannot tell how long ago came what waited for it."""
+        if now - self._turned_at > STANDSTILL_NS:
+            self._settled_at = now + STANDSTILL_NS
+        self._turned_at = now
+        self._node.admission.stood_still = now < self._settled_at
 
     def _watch_links(self) -> None:
         now = self._clock.now()

@@ -327,6 +327,12 @@ class Configuration:
         mesh = replace(self.mesh, start_ns=start_ns, start_time=float(Fraction(start_ns, 10**9)))
         return replace(self, mesh=mesh, values={**self.values, "mesh": {**table, "start_time": moment}})
 
+    def is_live(self, topic: str, name: str) -> bool:
+        """Whether messages of a topic and name come from a program, whose clock nobody of the mesh knows."""
+        if topic == "measurement":
+            return name in self.sensors and self.sensors[name].is_live
+        return topic == "input" and self.plant is not None and self.plant.is_external and name == self.plant.name
+
     def is_external(self, role: str, name: str) -> bool:
         """Whether a peer is a program of somebody else, which nobody of the mesh starts."""
         if role == "sensor":

@@ -151,7 +151,7 @@ class SimulatedMesh:
         self.witness = witness
         self.agenda = Agenda(rng)
         self.links = Links(plan, rng)
-        self.transport = Transport(plan, rng, self.links, self.agenda.add)
+        self.transport = Transport(plan, rng, self.links, self.agenda.add, is_live=self._is_live)
         self.processes: dict[str, Process] = {}
         self.stored: list[Reference] = []
         """What the recorder has on its disk."""
@@ -223,7 +223,7 @@ class SimulatedMesh:
         for other in self.processes.values():
             self._announce(process, other, at)
             for key in other.port.caches:
-                if self._listens(node, key):
+                if self._listens(node, key) and not self._is_live(key):
                     self.agenda.add(at + delay, self._history_of(other, process, key))
             if isinstance(other.node, FusionNode) and node.name in other.node.sources and node.role == "filter":
                 self.agenda.add(at + delay, self._last_of(other, process))
@@ -287,6 +287,10 @@ class SimulatedMesh:
             self._listeners[key] = listeners
         for name in listeners:
             self.transport.send(sample, sender.port, self.processes[name].port, at)
+
+    def _is_live(self, key: str) -> bool:
+        _, _, _, topic, name = key.split("/")
+        return self.configuration.is_live(topic, name)
 
     def _listens(self, node: Node, key: str) -> bool:
         _, _, mesh, topic, name = key.split("/")

@@ -113,9 +113,18 @@ class Links:
 
 
 class Transport:
-    """Carries samples between ports, or does not."""
+    """Carries samples between ports, or does not; what ``is_live`` by its key is never taken from a cache."""
 
-    def __init__(self, plan: FaultPlan, rng: random.Random, links: Links, schedule: Schedule) -> None:
+    def __init__(
+        self,
+        plan: FaultPlan,
+        rng: random.Random,
+        links: Links,
+        schedule: Schedule,
+        *,
+        is_live: Callable[[str], bool] = lambda key: False,
+    ) -> None:
+        self._is_live = is_live
         self._plan = plan
         self._rng = rng
         self.links = links
@@ -191,7 +200,10 @@ class Transport:
     # -- recovery
 
     def _miss(self, sample: Sample, sender: Port, receiver: Port, now: int) -> None:
-        """A sample was lost; the next heartbeat shows it, and the subscriber asks for it."""
+        """A sample was lost; the next heartbeat shows it, and the subscriber asks for it, but not for live data."""
+        if self._is_live(sample.key):
+            self.counts["given up"] += 1
+            return
         stream = receiver.streams.setdefault((sample.key, sample.boot), Stream())
         stream.missing.add(sample.number)
         wait = self._rng.randint(2, HEARTBEAT_NS // MILLISECOND) * MILLISECOND
