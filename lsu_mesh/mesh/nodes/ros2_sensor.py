@@ -22,7 +22,7 @@ class Ros2SensorNode(Node):
 
     A message that is of another type, that cannot be decoded or that has no usable stamp is refused and counted by its
     reason, and the health names the last one. With ``stamp = "receive"`` the time is that of the arrival, known to
-    within ``time_error``.
+    within ``time_error``; what came while the process stood still waited for longer, and is refused.
     """
 
     role = "sensor"
@@ -61,6 +61,8 @@ class Ros2SensorNode(Node):
         try:
             if wrong := self.dialect.refusal(key, self.topic.type, self.type_hash):
                 raise UnfitMessage("type", wrong)
+            if self.topic.stamp == "receive" and self.admission.stood_still:
+                raise UnfitMessage("standstill", "this process stood still, and nobody knows when the message came")
             reading = self._decoder.decode(payload)
         except UnfitMessage as unfit:
             return self._refuse(unfit, arrival_ns)

@@ -77,6 +77,21 @@ def test_a_receive_time_is_that_of_the_arrival(tmp_path: Path) -> None:
     assert (found.time_ns, found.time_error_ns) == (TIME_NS + 5, 3_000_000)
 
 
+def test_after_a_standstill_no_receive_time_is_believed(tmp_path: Path) -> None:
+    received = node(tmp_path, MESH.replace("time_error", 'stamp = "receive"\ntime_error'))
+    stamped = node(tmp_path)
+    for one in (received, stamped):
+        one.admission.stood_still = True
+    (found,) = stamped.take(KEY, payload(nav_sat_fix()), b"", TIME_NS)
+    assert isinstance(found, Measurement), "its stamp is right whenever it comes"
+    (told,) = received.take(KEY, payload(nav_sat_fix()), b"", TIME_NS)
+    assert isinstance(told, Event)
+    assert told.about["reason"] == "standstill"
+    received.admission.stood_still = False
+    (found,) = received.take(KEY, payload(nav_sat_fix()), b"", TIME_NS)
+    assert isinstance(found, Measurement)
+
+
 @pytest.mark.parametrize(
     ("key", "data", "reason", "words"),
     [
