@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from random_models import random_model
 
 from lsu_mesh import LSUCZ, LSUO, LSUP, LSUPB, FilterBank, LSUModel, Orthotope, run_filter, simulate, systems
 from lsu_mesh.errors import ModelError
@@ -21,17 +22,6 @@ SYSTEMS = [("S1", 0.05, 0.02), ("S1", 0.1, 0.1), ("S2", 0.1, 0.1), ("S3", 0.1, 0
 
 def unit(n: int, size: float = 1.0) -> Orthotope:
     return Orthotope([-size] * n, [size] * n)
-
-
-def random_model(seed: int) -> LSUModel:
-    """A stable model of 1–5 states, some of them without noise, some with exact outputs."""
-    rng = np.random.default_rng(seed)
-    n, m = int(rng.integers(1, 6)), int(rng.integers(1, 4))
-    A = rng.normal(size=(n, n))
-    A *= rng.uniform(0.3, 1.0) / max(1e-9, np.abs(np.linalg.eigvals(A)).max())
-    rho = rng.uniform(0.01, 0.2, n) * (rng.random(n) < 0.8)
-    r = rng.uniform(0.01, 0.3, m) * (rng.random(m) < 0.95)
-    return LSUModel(A, rng.normal(size=(n, 1)), rng.normal(size=(m, n)), rho=rho, r=r, domain=unit(n, 100.0))
 
 
 def check_points(kind: str, model: LSUModel, steps: int, seed: int) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from random_models import random_model
 
-from lsu_mesh import LSUCZ, LSUO, LSUPB, ModelError, Orthotope, fuse, simulate, systems
+from lsu_mesh import LSUCZ, LSUO, LSUPB, LSUModel, ModelError, Orthotope, fuse, simulate, systems
 from lsu_mesh.fusion.point import weighted_mean
 
 
@@ -27,10 +28,20 @@ def test_a_source_without_width_counts_alone() -> None:
 @pytest.mark.parametrize("system", [("S1", 0.05, 0.02), ("S2", 0.1, 0.1), ("S3", 0.1, 0.1), ("P3", 0.1, 0.3)], ids=str)
 def test_the_fused_point_lies_in_the_fused_set(policy: str, faults: int, system: tuple[str, float, float]) -> None:
     name, rho, r = system
-    model = systems.get(name, rho=rho, r=r)
+    check_points(systems.get(name, rho=rho, r=r), policy, faults, steps=12)
+
+
+@pytest.mark.parametrize(("policy", "faults"), [("intersect", 0), ("relaxed", 1)])
+@pytest.mark.parametrize("first", [0, pytest.param(10, marks=pytest.mark.soak)])
+def test_the_fused_point_lies_in_the_fused_set_of_random_models(policy: str, faults: int, first: int) -> None:
+    for seed in range(first, 10 if first == 0 else 200):
+        check_points(random_model(seed), policy, faults, steps=4)
+
+
+def check_points(model: LSUModel, policy: str, faults: int, steps: int) -> None:
     n = model.state_count
     filters = [kind(model, Orthotope([-1.0] * n, [1.0] * n)) for kind in (LSUO, LSUPB, LSUCZ)]
-    data = simulate(model, 12, seed=3, x1=np.zeros(n))
+    data = simulate(model, steps, seed=3, x1=np.zeros(n))
     for y, u in zip(data.Y, data.U, strict=True):
         for filter in filters:
             filter.update(y)

@@ -54,8 +54,8 @@ def draw_clock_steps(
 def with_simulated_plant(configuration: Configuration, start_ns: int) -> Configuration:
     """The mesh of live sources with t_0 known, and a plant that moves what they measure."""
     plant = configuration.plant
-    if plant is None or plant.is_external:
-        plant = PlantSettings("plant" if plant is None else plant.name, None, "normal", None)
+    if plant is None:
+        plant = PlantSettings("plant", None, "normal", None)
     return replace(configuration.started(start_ns), plant=plant)
 
 
