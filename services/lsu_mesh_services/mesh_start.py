@@ -41,7 +41,7 @@ class MeshStart:
         if not self._declared.awaits_start:
             return self._declared
         who, began = f"{self._role} {self._name}", clock.now()
-        agreement = StartAgreement(self._declared, self._role, self._name, began, self._known_ns)
+        agreement = StartAgreement(self._declared, self._role, self._name, began, start_ns=self._known_ns)
         self._agreement = agreement
         bus.declare_alive(key(self._declared.mesh.name, "live", self._name))
         is_told = False

@@ -9,6 +9,8 @@ from typing import Any
 import msgpack
 import pytest
 from local_mesh import LocalMesh
+from lsu_mesh_services.bus import Clock
+from lsu_mesh_services.mesh_start import MeshStart
 from lsu_mesh_services.peer import Peer
 
 from lsu_mesh.mesh.access import access
@@ -41,14 +43,14 @@ def test_filters_and_fusions_answer_and_nobody_else(demo: Path, changes: list[st
     answered = {}
     for name, node in LocalMesh(configuration).nodes.items():
         line: Any = Line()
-        clock: Any = None
-        Peer(node, line, clock).declare()
+        Peer(node, line, Clock(), MeshStart(configuration, node.role, name)).declare()
         may = access(configuration, node.role, name)
         assert (asked in line.answers) == (asked in may.answers), name
         if asked in line.answers:
             answered[name] = line.answers[asked]()
     assert set(answered) == ESTIMATORS
-    assert len(set(answered.values())) == 1, "all say the same"
-    address, payload, encoding = answered["box"]
-    assert (address, encoding) == (asked, "application/msgpack")
-    assert msgpack.unpackb(payload)["model"] == configuration.digest()
+    assert {(address, encoding) for address, _, encoding in answered.values()} == {(asked, "application/msgpack")}
+    told = {name: msgpack.unpackb(payload) for name, (_, payload, _) in answered.items()}
+    assert len({one.pop("boot") for one in told.values()}) == len(ESTIMATORS), "each says who it is"
+    assert all(one == told["box"] for one in told.values()), "all else is the same"
+    assert told["box"]["model"] == configuration.digest()

@@ -94,19 +94,20 @@ def live_source_warnings(
                 "sends times, and a discrete model takes only those on the grid: all others are refused; "
                 "set [model] continuous = true, or give rate, or grid_tolerance"
             )
-            found.append(_warning(file, f"sensors.{sensor.name}", "source", text, "a continuous model, or rate"))
+            expected = "a continuous model, or rate"
+            found.append(_warning(file, (f"sensors.{sensor.name}", "source"), text, expected))
     simulated = [sensor.name for sensor in sensors.values() if sensor.is_simulated]
     if live and simulated:
         text = (
             f"is simulated, beside {live[0].name}, which is live: they agree only if {live[0].name} measures the "
             "simulated plant too"
         )
-        found.append(_warning(file, f"sensors.{simulated[0]}", "source", text, "sources that measure one plant"))
+        found.append(_warning(file, (f"sensors.{simulated[0]}", "source"), text, "sources that measure one plant"))
     if live and has_unknown_inputs:
         text = "is missing, and the model has inputs that nobody sends: every filter waits for them; give input_box"
-        found.append(_warning(file, "model", "input_box", text, "a box of all inputs, or [plant]"))
+        found.append(_warning(file, ("model", "input_box"), text, "a box of all inputs, or [plant]"))
     return found
 
 
-def _warning(file: str, table: str, key: str, text: str, expected: str) -> Problem:
-    return Problem(file=file, table=table, key=key, text=text, expected=expected, is_warning=True)
+def _warning(file: str, place: tuple[str, str], text: str, expected: str) -> Problem:
+    return Problem(file=file, table=place[0], key=place[1], text=text, expected=expected, is_warning=True)

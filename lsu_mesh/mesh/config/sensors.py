@@ -62,7 +62,7 @@ def read_plant(
         table.without("inputs", "has no effect beside a file of inputs", "remove one of the two")
     inputs = "file" if file is not None else inputs
     table.finish()
-    return PlantSettings(name, None if x1 is None else tuple(x1), inputs, file, is_external)
+    return PlantSettings(name, None if x1 is None else tuple(x1), inputs, file, is_external=is_external)
 
 
 def read_sensor(table: Table, name: str, system: System, folder: Path) -> SensorSettings:

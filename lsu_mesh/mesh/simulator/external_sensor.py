@@ -143,8 +143,9 @@ class ExternalSensor(Node):
         ]  # fmt: skip
 
     def offset(self, at: int) -> int:
-        """How wrong the clock is, in ns."""
-        return sum(step.offset_ns for step in self._clock_steps if step.begin <= at < step.end)
+        """How wrong the clock is, in ns: the last setting counts, as sums of two could be small and be believed."""
+        wrong = [step for step in self._clock_steps if step.begin <= at < step.end]
+        return max(wrong, key=lambda step: step.begin).offset_ns if wrong else 0
 
     def wakeup(self) -> int | None:
         return self._next
