@@ -86,4 +86,5 @@ class Ros2Telling:
             for state, i in self._places.items():
                 values |= {f"{state} lower": repr(newest.lower[i]), f"{state} upper": repr(newest.upper[i])}
         name = f"lsu_mesh: {self._configuration.mesh.name}/{peer.role}/{peer.name}"
-        return Status(peer.level, name, "; ".join(peer.reasons) or "fine", peer.host or "", values)
+        message = "; ".join(peer.reasons) or "fine"
+        return Status(peer.level, name, message, hardware_id=peer.host or "", values=values)

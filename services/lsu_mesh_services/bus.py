@@ -136,7 +136,7 @@ class Bus:
         def came(sample: Any) -> None:
             attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
             now, payload = self._clock.now(), sample.payload.to_bytes()
-            self._arrivals.put(Arrival(what, str(sample.key_expr), payload, now, attachment))
+            self._arrivals.put(Arrival(what, str(sample.key_expr), payload, now, attachment=attachment))
 
         self._declared.append(self._session.declare_subscriber(key, came))
 

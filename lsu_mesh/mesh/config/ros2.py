@@ -89,7 +89,7 @@ def _read_publication(table: Table) -> Ros2Publication:
     frame_id = table.text("frame_id", "map")
     diagnostics = table.flag("diagnostics", True)
     table.finish()
-    return Ros2Publication(str(estimator), str(topic), tuple(states), frame_id, diagnostics)
+    return Ros2Publication(str(estimator), str(topic), tuple(states), frame_id=frame_id, diagnostics=diagnostics)
 
 
 def check_ros2(

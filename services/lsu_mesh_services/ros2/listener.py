@@ -42,7 +42,7 @@ class Ros2Listener:
     def __enter__(self) -> Self:
         node, topic, dialect = self._node, self._node.topic, self._node.dialect
         shown = Node(self._bus.zid, 0, f"lsu_mesh_{node.name.replace('-', '_')}")
-        subscription = Endpoint("MS", 1, topic.topic, topic.type, node.type_hash, DEPTH)
+        subscription = Endpoint("MS", 1, topic.topic, topic.type, type_hash=node.type_hash, depth=DEPTH)
         for token in (dialect.node_token(shown), dialect.endpoint_token(shown, subscription)):
             if token:
                 self._bus.declare_alive(token)

@@ -34,7 +34,9 @@ class Ros2Publishers:
             type_hash = type_hash_of(network.distro, type_name)
             self._keys[topic, type_name] = self._dialect.data_key(topic, type_name, type_hash)
             bus.announce_plain(self._keys[topic, type_name])
-            token = self._dialect.endpoint_token(node, Endpoint("MP", number, topic, type_name, type_hash, DEPTH))
+            token = self._dialect.endpoint_token(
+                node, Endpoint("MP", number, topic, type_name, type_hash=type_hash, depth=DEPTH)
+            )
             self._gids[topic, type_name] = gid_of(token)
             if token:
                 bus.declare_alive(token)
