@@ -78,7 +78,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.fusion": [("intersection", "point"), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
-        ("message_examples", "sets", "data_files"),
+        ("message_examples", "sets", "data_files", "ros2"),
         ("config",),
         (
             "access",
@@ -96,6 +96,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("estimation",),
         ("nodes",),
         ("observer", "replay", "verification"),
+        ("ros2_telling",),
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [
@@ -138,6 +139,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("session", "configuration", "mesh_start"),
         ("recording", "monitoring"),
         ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh"),
+        ("ros2",),
         ("mesh_launcher",),
         ("replay",),
         ("commands",),

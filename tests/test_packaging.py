@@ -112,11 +112,11 @@ def names(requirements: list[str]) -> list[str]:
 
 def test_the_extras_are_those_that_commands_look_for(root: Path) -> None:
     declared = {extra: names(listed) for extra, listed in project(root)["optional-dependencies"].items()}
-    assert declared["record"][0] == "lsu-mesh[mesh]"
-    declared["record"][:1] = declared["mesh"]
-    assert {extra.name: list(extra.modules) for extra in EXTRAS} == {
-        name: declared[name] for name in ("mesh", "record")
-    }
+    parts = ("record", "ros2")
+    for name in parts:
+        assert declared[name][0] == "lsu-mesh[mesh]"
+        declared[name][:1] = declared["mesh"]
+    assert {extra.name: list(extra.modules) for extra in EXTRAS} == {name: declared[name] for name in ("mesh", *parts)}
     base = names(project(root)["dependencies"])
     assert base == ["numpy", "scipy", "numba", "msgspec", "rich"]
 

@@ -12,10 +12,12 @@ from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE
 from lsu_mesh_services.extras import refusal
 from lsu_mesh_services.options import (
     bench,
+    bridge,
     doctor,
     graph,
     health,
     identify,
+    import_bag,
     keys,
     new,
     peer,
@@ -37,6 +39,7 @@ GROUPS = (
     peer,
     publish,
     new,
+    import_bag,
     validate,
     doctor,
     graph,
@@ -46,6 +49,7 @@ GROUPS = (
     view,
     replay,
     recording,
+    bridge,
     simulate,
     identify,
     reproduce,
