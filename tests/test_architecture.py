@@ -78,7 +78,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.fusion": [("intersection", "point"), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
-        ("message_examples", "sets", "data_files", "ros2"),
+        ("message_examples", "sets", "data_files", "ros2", "json_form"),
         ("config",),
         (
             "access",
@@ -138,7 +138,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("bus",),
         ("session", "configuration", "mesh_start"),
         ("recording", "monitoring"),
-        ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh"),
+        ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
         ("ros2",),
         ("mesh_launcher",),
         ("replay",),

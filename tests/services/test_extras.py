@@ -13,7 +13,7 @@ import pytest
 from lsu_mesh_services import extras
 from lsu_mesh_services.cli import build_parser, main
 from lsu_mesh_services.exit_codes import COULD_NOT_START, NOT_MET, OK
-from lsu_mesh_services.extras import MESH, RECORD, ROS2, Extra
+from lsu_mesh_services.extras import GATEWAY, MCAP, MESH, RECORD, ROS2, Extra
 from without_modules import without
 
 FILE = "x.rrd"
@@ -29,6 +29,8 @@ NEEDS = (
         "bench recording",
     )),
     (ROS2, ("import drive.mcap", "bridge ros2")),
+    (GATEWAY, ("gateway", "gateway --http 127.0.0.1:0")),
+    (MCAP, (f"recording export {FILE} --format mcap",)),
 )  # fmt: skip
 NONE = (
     "validate m.toml",
