@@ -114,11 +114,11 @@ def names(requirements: list[str]) -> list[str]:
 
 def test_the_extras_are_those_that_commands_look_for(root: Path) -> None:
     declared = {extra: names(listed) for extra, listed in project(root)["optional-dependencies"].items()}
-    for extra, inner in (("record", "mesh"), ("gateway", "mesh"), ("mcap", "record")):
+    for extra, inner in (("record", "mesh"), ("ros2", "mesh"), ("gateway", "mesh"), ("mcap", "record")):
         assert declared[extra][0] == f"lsu-mesh[{inner}]"
         declared[extra][:1] = declared[inner]
     assert {extra.name: list(extra.modules) for extra in EXTRAS} == {
-        name: declared[name] for name in ("mesh", "record", "gateway", "mcap")
+        name: declared[name] for name in ("mesh", "record", "ros2", "gateway", "mcap")
     }
     base = names(project(root)["dependencies"])
     assert base == ["numpy", "scipy", "numba", "msgspec", "rich"]

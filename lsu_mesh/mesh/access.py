@@ -62,7 +62,8 @@ def access(configuration: Configuration, role: str, name: str) -> Access:
     if role == "recorder":
         reads = tuple(key(mesh, topic, "*") for topic in TOPICS if topic != "live")
     else:
-        reads = tuple(key(mesh, topic, other) for topic, other in subscriptions(configuration, role, name))
+        listed = [*subscriptions(configuration, role, name), ("health", name)]  # its own: whether it runs twice
+        reads = tuple(key(mesh, topic, other) for topic, other in listed)
     asks = (model_key(mesh), *((last_key(mesh, name),) if role == "filter" else ()))
     return Access(tuple(key(mesh, topic, name) for topic in topics), reads, asks, _answers(configuration, role, name))
 

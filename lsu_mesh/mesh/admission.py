@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection
 
 from lsu_mesh.fusion.policies import POLICIES
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.duplicate_publishers import DuplicatePublishers
 from lsu_mesh.mesh.input_time import check_beginning
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.live_times import check_live_time
@@ -43,6 +44,7 @@ WINDOW = 4096
 """How far back in a sequence a message may come late and still be told from a copy."""
 MAX_BOOTS = 16
 UNLIMITED = 4096
+DUPLICATE_PUBLISHER = "duplicate publisher"
 MAX_NAMES = 64
 """So many unknown fields are counted by name; whoever sends more of them is counted without."""
 
@@ -78,6 +80,10 @@ class Sequence:
             self._unseen.remove(seq)
             return True
         return False
+
+    def want(self, numbers: Collection[int]) -> None:
+        """Numbers that have come and were not used are missing again."""
+        self._gaps.update(number for number in numbers if self._newest - WINDOW <= number <= self._newest)
 
     @property
     def gaps(self) -> int:
@@ -126,20 +132,25 @@ class Admission:
         """Whether what comes now has waited while this process stood still."""
         self.decoder: Callable[[str, bytes], tuple[Message, tuple[str, ...]]] = read
         """What makes messages of payloads; many receivers in one process may share one with a memory."""
+        self.publishers: DuplicatePublishers | None = None
+        """Which of two living processes of one key is refused; None: what all of them send is let in."""
+        self.datum_refused: Callable[[Refused, int], None] | None = None
+        """Told of each datum that is refused for its time, and when that was."""
 
     def admit(self, key: str, payload: bytes, now: int | None = None) -> Message | None:
         """The message, or ``None`` when it is refused or a copy.
 
-        ``now``: the receiver's clock in ns since 1970, by which times of live sources are judged; None: they are not.
+        ``now``: the receiver's clock in ns since 1970 when it came, by which times of live sources are judged, and
+        whether another process lives; None: they are not.
         """
         try:
             message, unknown = self._checked(key, payload, now)
             if not self._is_new(key, message):
                 self.duplicates += 1
                 return None
+            self._check_publisher(key, message, now)
         except Refused as refusal:
-            self.refused[refusal.reason] += 1
-            self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
+            self._refuse(key, refusal, now)
             return None
         self.received += 1
         if unknown:
@@ -174,6 +185,23 @@ class Admission:
             counts["unknown fields"] = self.with_unknown_fields
             counts |= {f"unknown fields.{name}": count for name, count in sorted(self.unknown_fields.items())}
         return counts
+
+    def _refuse(self, key: str, refusal: Refused, now: int | None) -> None:
+        self.refused[refusal.reason] += 1
+        self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
+        if refusal.seconds is not None and now is not None and self.datum_refused is not None:
+            self.datum_refused(refusal, now)
+
+    def _check_publisher(self, key: str, message: Message, now: int | None) -> None:
+        """Refuse what a second living process sends; what was refused when the first was gone already is asked for."""
+        if self.publishers is None or now is None:
+            return
+        pair = self.publishers.refuses(key, message, now)
+        for address, boot, numbers in self.publishers.take_missed():
+            if not self._configuration.is_live(message.topic, message.name):
+                self._sequences[address, boot].want(numbers)
+        if pair is not None:
+            raise Refused(DUPLICATE_PUBLISHER, pair.words)
 
     def _count_unknown(self, topic: str, fields: tuple[str, ...]) -> None:
         self.with_unknown_fields += 1
@@ -224,7 +252,9 @@ class Admission:
         if message.step < 1 and not counts_by_time:
             raise Refused("step", "steps count from 1")
         if self._last is not None and message.step > self._last + 1:
-            raise Refused("step", f"step {message.step} of a mesh that ends at step {self._last}")
+            text = f"step {message.step} of a mesh that ends at step {self._last}"
+            seconds = (self._last - message.step) / self._configuration.mesh.rate
+            raise Refused("step", text, source=name, seconds=seconds)
         if isinstance(message, Fused) and message.policy not in POLICIES:
             known = ", ".join(POLICIES)
             raise Refused("policy", f"fused by policy {message.policy!r}, which this peer does not know ({known})")

@@ -51,10 +51,10 @@ def check_live_time(
             f"{message.name} says a time {ahead / SECOND:.3g} s ahead of this clock, and at most "
             f"{mesh.future_ns / SECOND:g} s are believed; set one of the two clocks, or [mesh] future"
         )
-        raise Refused("future", text)
+        raise Refused("future", text, source=message.name, seconds=-ahead / SECOND)
     if ahead + error < -mesh.past_ns:
         text = (
             f"{message.name} says a time {-ahead / SECOND:.3g} s behind this clock, and at most "
             f"{mesh.past_ns / SECOND:g} s are believed; set one of the two clocks, or [mesh] past where data come late"
         )
-        raise Refused("past", text)
+        raise Refused("past", text, source=message.name, seconds=-ahead / SECOND)

@@ -43,7 +43,8 @@ def placed(configuration: Configuration, message: Measurement) -> Measurement:
         raise Refused("off the grid", text)
     last = configuration.mesh.steps
     if last is not None and k > last:
-        raise Refused("step", f"step {k} of a mesh that ends at step {last}")
+        text, seconds = f"step {k} of a mesh that ends at step {last}", (last - k) / configuration.mesh.rate
+        raise Refused("step", text, source=message.name, seconds=seconds)
     return message if message.step == k else structs.replace(message, step=max(0, k))
 
 

@@ -39,11 +39,16 @@ _BOOT = re.compile(r"[0-9a-f]{16}")
 
 
 class Refused(Exception):
-    """A payload is not a message of this protocol; ``reason`` is a short word to count it by."""
+    """A payload is not a message of this protocol; ``reason`` is a short word to count it by.
 
-    def __init__(self, reason: str, text: str) -> None:
+    A datum that is refused for its time names its ``source`` and by how many ``seconds`` it is late (below 0: early).
+    """
+
+    def __init__(self, reason: str, text: str, *, source: str = "", seconds: float | None = None) -> None:
         super().__init__(text)
         self.reason = reason
+        self.source = source
+        self.seconds = seconds
 
 
 class _Strict(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

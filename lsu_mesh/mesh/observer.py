@@ -11,8 +11,10 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.duplicate_process import WORDS
 from lsu_mesh.mesh.messages import Health
 from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.processes import Process, Processes, process_of, words_of
 
 Level = Literal["OK", "WARN", "ERROR", "STALE"]
 LEVELS: tuple[Level, ...] = ("OK", "WARN", "ERROR", "STALE")
@@ -38,6 +40,8 @@ class PeerHealth:
     """When its process started, by its own clock; None where it does not say."""
     host: str | None = None
     """Machine that it runs on; None where it does not say."""
+    processes: tuple[Process, ...] = ()
+    """All that run under the name now; more than one is a mistake."""
 
 
 @dataclass
@@ -62,10 +66,12 @@ class HealthObserver:
         self._external = {name for role, name in configuration.peers() if configuration.is_external(role, name)}
         self._began = now
         self._received_at: dict[str, _Heard] = {}
+        self._processes = Processes()
         self._gone: set[str] = set()
 
     def record(self, message: Health, now: int) -> None:
         """A heartbeat; one of an earlier life that comes late does not count."""
+        self._processes.record(message, now)
         known = self._received_at.get(message.name)
         if known is not None:
             before = known.message
@@ -100,8 +106,8 @@ class HealthObserver:
             reason = f"no heartbeat in {waited / SECOND:.1f} s" if name not in self._gone else "left the mesh"
             return PeerHealth(name, self._roles[name], "STALE" if is_late else "WARN", (reason,))
         message, age = heard.message, now - heard.at
-        level: Level = message.level
-        reasons = tuple(message.reasons)
+        living = self._processes.newest(name, now)
+        level, reasons = _told_by(living if len(living) > 1 else [message])
         if name in self._gone:
             level, reasons = "STALE", ("left the mesh", *reasons)
         elif age >= STALE_NS:
@@ -116,7 +122,18 @@ class HealthObserver:
             counters=message.counters,
             started_ns=message.started_ns,
             host=message.host,
+            processes=tuple(process_of(one) for one in living),
         )
+
+
+def _told_by(messages: Sequence[Health]) -> tuple[Level, tuple[str, ...]]:
+    """The worst level of a peer's processes and all that they say, each thing once."""
+    reasons = dict.fromkeys(reason for message in messages for reason in message.reasons)
+    levels: list[Level] = [message.level for message in messages]
+    if len(messages) == 1:
+        return levels[0], tuple(reasons)
+    words = f"{words_of([process_of(message) for message in messages])}; stop all but one"
+    return worst([*levels, "WARN"]), (words, *(reason for reason in reasons if not reason.startswith(WORDS)))
 
 
 def worst(levels: Sequence[Level]) -> Level:

@@ -355,6 +355,7 @@ def _settle(run: Run) -> None:
 def _sum_up(run: Run) -> int:
     restarts = {child.name: child.restarts for child in run.supervisor.children}
     rows = run.report.rows(restarts)
+    run.happened += run.report.duplicates.values()
     opening = _opening_line(run.recording)
     if run.options.json:
         print_json(rows, run.happened, run.report.events, run.recording)

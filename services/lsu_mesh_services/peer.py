@@ -6,10 +6,13 @@ import gc
 import socket
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Protocol
 
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
-from lsu_mesh.mesh.messages import Message, encode, encoding
+from lsu_mesh.mesh.messages import Event, Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
@@ -20,6 +23,7 @@ from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.mesh_start import MeshStart, moment_text
 from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
 
 LOOK_AT_LINKS_NS = 100_000_000
@@ -29,6 +33,19 @@ MAX_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
 
+class Beside(Protocol):
+    """A part in another network, whose arrivals come through the queue of the peer."""
+
+    def look(self) -> None:
+        """Note how it is connected; called ten times a second."""
+
+    def take(self, arrival: Arrival) -> list[Message] | None:
+        """What to publish after an arrival; None where it is not of that network."""
+
+
+OpenBeside = Callable[[Node, Bus, Clock], AbstractContextManager[Beside]]
+
+
 def run_peer(
     configuration: Configuration,
     who: tuple[str, str],
@@ -36,6 +53,7 @@ def run_peer(
     *,
     settings: SessionSettings,
     stop: Stop,
+    beside: OpenBeside | None = None,
 ) -> int:
     """Run the node of ``(role, name)`` until it is told to stop; returns the exit code.
 
@@ -48,7 +66,7 @@ def run_peer(
         return USAGE
     while True:
         start = MeshStart(configuration, *who, known_ns=known_ns)
-        with Bus(settings, clock) as bus:
+        with Bus(settings, clock) as bus, connection_report(" ".join(who), bus, settings):
             if node is None:
                 started = start.configuration(bus, clock, lambda: bool(stop))
                 if started is None:
@@ -56,22 +74,24 @@ def run_peer(
                 node = make(started)
                 if node is None:
                     return USAGE
-            _run(node, bus, clock, stop=stop, start=start, is_moved=known_ns is not None)
+            with nullcontext() if beside is None else beside(node, bus, clock) as other:
+                _run(node, bus, clock, stop=stop, start=start, is_moved=known_ns is not None, beside=other)
         if start.other_ns is None:
             return OK
         known_ns, node = start.other_ns, None
 
 
-def _run(node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is_moved: bool) -> None:
+def _run(
+    node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is_moved: bool, beside: Beside | None
+) -> None:
     """Until the process is told to stop, or the mesh turns out to have another start."""
     node.started_ns, node.host = clock.now(), socket.gethostname()
     node.warm_up()
     gc.collect()
     gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
     bus.keep(node.configuration.cached * node.messages_per_step)
-    peer = Peer(node, bus, clock, start)
+    peer = Peer(node, bus, clock, start, beside=beside)
     peer.declare()
-    print(f"{node.role} {node.name}: on the mesh", file=sys.stderr)
     if is_moved:
         peer.tell_moved()
     said_finished = False
@@ -89,8 +109,9 @@ def _run(node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is
 class Peer:
     """The loop around a node: drain the queue, tick, publish."""
 
-    def __init__(self, node: Node, bus: Bus, clock: Clock, start: MeshStart) -> None:
+    def __init__(self, node: Node, bus: Bus, clock: Clock, start: MeshStart, *, beside: Beside | None = None) -> None:
         self._node = node
+        self._beside = beside
         self._start = start
         self._bus = bus
         self._clock = clock
@@ -108,6 +129,7 @@ class Peer:
         for topic, name in self._node.subscriptions():
             is_live = self._node.configuration.is_live(topic, name)
             (self._bus.subscribe_live if is_live else self._bus.subscribe)(key(self._mesh, topic, name))
+        self._bus.subscribe_live(key(self._mesh, "health", self._node.name))  # another process of the own name
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", self._node.name))
         if isinstance(self._node, FilterNode):
@@ -189,6 +211,8 @@ class Peer:
         if now < self._next_look:
             return
         self._next_look = now + LOOK_AT_LINKS_NS
+        if self._beside is not None:
+            self._beside.look()
         links = self._bus.links()
         if links != self._links:
             self._links = links
@@ -205,6 +229,8 @@ class Peer:
         return min(MAX_WAIT, max(0.0005, (wakeup - self._clock.now()) * 1e-9))
 
     def _take(self, arrival: Arrival) -> list[Message]:
+        if self._beside is not None and (found := self._beside.take(arrival)) is not None:
+            return found
         if arrival.what == "sample":
             if self._start.receives(arrival.key, arrival.payload):
                 return []
@@ -212,11 +238,8 @@ class Peer:
         if arrival.what == "alive":
             self._start.somebody_came(arrival.arrival_ns)
         address = parse(arrival.key)
-        if address is not None and isinstance(self._node, Estimator) and address.name in self._node.sources:
-            if arrival.what == "gone":
-                self._node.absent.add(address.name)
-            else:
-                self._node.absent.discard(address.name)
+        if address is not None:
+            self._node.record_alive(address.name, arrival.what == "alive", arrival.arrival_ns)
         return []
 
     def _canonical(self, sample_key: str) -> str:
@@ -227,4 +250,6 @@ class Peer:
 
     def _publish(self, messages: Iterable[Message]) -> None:
         for message in messages:
+            if isinstance(message, Event) and message.code == DUPLICATE_PROCESS:
+                print(f"{self._node.role} {self._node.name}: {message.text}", file=sys.stderr)
             self._bus.publish(self._node.key(message), encode(message), encoding(message.topic))

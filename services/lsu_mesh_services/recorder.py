@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.duplicate_process import DuplicateProcess
 from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
@@ -23,6 +24,7 @@ from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part
+from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
 
 ROLE_NAME = "recorder"
@@ -69,7 +71,8 @@ def _record(start: MeshStart, part: Path, session: Session, path: Path) -> int:
     """Write one part of a recording, until told to stop or until the mesh turns out to have another start."""
     recorder: Recorder | None = None
     try:
-        with Bus(session.settings, session.clock) as bus:
+        settings = session.settings
+        with Bus(settings, session.clock) as bus, connection_report(ROLE_NAME, bus, settings):
             started = start.configuration(bus, session.clock, lambda: bool(session.stop))
             if started is None:
                 return OK
@@ -87,7 +90,7 @@ def _record(start: MeshStart, part: Path, session: Session, path: Path) -> int:
             service.declare()
             gc.collect()
             gc.freeze()  # as every peer does
-            print(f"recorder: on the mesh, writing {part}", file=sys.stderr)
+            print(f"recorder: writing {part}", file=sys.stderr)
             while not session.stop and start.other_ns is None:
                 service.turn()
             service.finish()
@@ -122,6 +125,7 @@ class RecorderService:
         self._links = -1
         self._queue = self._longest_ns = 0
         """The longest queue and turn since the last health message."""
+        self._other_process = DuplicateProcess(f"{ROLE_NAME}/{ROLE_NAME}", self._boot)
         self._roles = {name: role for role, name in configuration.peers()}
         others = [
             name for role, name in configuration.peers()
@@ -184,6 +188,8 @@ class RecorderService:
                 self._recorder.record(arrival.key, arrival.payload, arrival.arrival_ns, message)
             if isinstance(message, Health) and message.name != ROLE_NAME:
                 self._source_timeouts.received(message.name, arrival.arrival_ns)
+            elif isinstance(message, Health):
+                self._other_process.record(message, self._started_ns, arrival.arrival_ns)
             return
         if arrival.what == "alive":
             self._start.somebody_came(arrival.arrival_ns)
@@ -194,6 +200,10 @@ class RecorderService:
 
     def _tell_health(self, now: int) -> None:
         problems = list(self._recorder.problems)
+        twice = self._other_process.complaint(now)
+        problems += [] if twice is None else [twice]
+        if self._other_process.take_news(now) is not None:
+            print(f"{ROLE_NAME}: {twice}", file=sys.stderr)
         problems += [complaint.text for complaint in self._source_timeouts.complaints(now)]
         if self._bus.dropped:
             problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")

@@ -8,8 +8,9 @@ from collections.abc import Callable
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import READER
-from lsu_mesh_services.bus import NoSession, SessionSettings
+from lsu_mesh_services.bus import Bus, NoSession, SessionSettings
 from lsu_mesh_services.exit_codes import COULD_NOT_START, USAGE
+from lsu_mesh_services.network.connection import ConnectionReport, ConnectionWords
 from lsu_mesh_services.network.security import InsecureSession, certificates, check_endpoints
 
 
@@ -37,6 +38,14 @@ def session_settings(configuration: Configuration, options: argparse.Namespace) 
         zenoh=tuple(options.cfg),
         certificates=certificates(configuration, name),
     )
+
+
+def connection_report(
+    who: str, bus: Bus, settings: SessionSettings, *, says_connected: bool = True
+) -> ConnectionReport:
+    """Says on stderr, as long as it is open, when the session is connected to nobody, and when it is again."""
+    words = ConnectionWords(settings.connect, settings.listen, says_connected=says_connected)
+    return ConnectionReport(who, bus.links, words)
 
 
 def with_session(who: str, work: Callable[[], int]) -> int:

@@ -34,7 +34,7 @@ def test_every_key_has_one_publisher_whose_name_it_ends_with(configuration: Conf
 def test_a_sensor_publishes_its_measurement_and_what_every_peer_does(configuration: Configuration) -> None:
     may = all_access(configuration)["s1"]
     assert may.publishes == tuple(f"lsu/v1/example/{topic}/s1" for topic in ("measurement", "health", "event"))
-    assert may.reads == ("lsu/v1/example/truth/plant",)
+    assert may.reads == ("lsu/v1/example/truth/plant", "lsu/v1/example/health/s1")
     assert may.answers == ()
 
 
@@ -52,6 +52,7 @@ def test_a_filter_reads_its_sensors_inputs_transfers_and_fusion_and_no_truth(con
     mesh = "lsu/v1/example"
     others = {f"{mesh}/prediction/{name}" for name in ("box", "para", "zonotope")}
     measured = {f"{mesh}/measurement/s2", f"{mesh}/measurement/s3"}
+    reads = {name: {key for key in keys if "/health/" not in key} for name, keys in reads.items()}
     assert reads["cz"] == {*measured, f"{mesh}/input/plant", f"{mesh}/fused/main", *others}
     assert reads["para"] == {f"{mesh}/measurement/s1", f"{mesh}/input/plant", f"{mesh}/fused/main"}
 
@@ -59,7 +60,9 @@ def test_a_filter_reads_its_sensors_inputs_transfers_and_fusion_and_no_truth(con
 def test_a_node_listens_to_what_it_may_read(configuration: Configuration) -> None:
     node = FilterNode(configuration, "box", "0" * 16)
     may = access(configuration, "filter", "box")
-    assert {f"lsu/v1/example/{topic}/{name}" for topic, name in node.subscriptions()} == set(may.reads)
+    own_health = ("health", "box")
+    listened = [*node.subscriptions(), own_health]
+    assert {f"lsu/v1/example/{topic}/{name}" for topic, name in listened} == set(may.reads)
     fusion = FusionNode(configuration, "main", "0" * 16)
     assert {name for _, name in fusion.subscriptions()} == {"box", "para", "cz", "plant"}
 

@@ -13,7 +13,7 @@ import pytest
 from lsu_mesh_services import extras
 from lsu_mesh_services.cli import build_parser, main
 from lsu_mesh_services.exit_codes import COULD_NOT_START, NOT_MET, OK
-from lsu_mesh_services.extras import GATEWAY, MCAP, MESH, RECORD, Extra
+from lsu_mesh_services.extras import GATEWAY, MCAP, MESH, RECORD, ROS2, Extra
 from without_modules import without
 
 FILE = "x.rrd"
@@ -28,6 +28,7 @@ NEEDS = (
         f"recording merge {FILE}", f"recording export {FILE} --format parquet", f"identify m.toml --recording {FILE}",
         "bench recording",
     )),
+    (ROS2, ("import drive.mcap", "bridge ros2")),
     (GATEWAY, ("gateway", "gateway --http 127.0.0.1:0")),
     (MCAP, (f"recording export {FILE} --format mcap",)),
 )  # fmt: skip
@@ -104,7 +105,7 @@ def test_what_needs_no_extra_says_so(line: str, monkeypatch: pytest.MonkeyPatch)
 @pytest.fixture
 def bare(lsu_mesh_command: list[str], tmp_path: Path) -> object:
     """Runs a command where no module of an extra can be imported."""
-    folder = without(RECORD.modules.values(), tmp_path / "blocked")
+    folder = without([*RECORD.modules.values(), *ROS2.modules.values()], tmp_path / "blocked")
     paths = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]).strip(os.pathsep)
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:

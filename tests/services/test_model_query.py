@@ -33,7 +33,7 @@ class Line:
     def ignore(self, *_: object) -> None:
         pass
 
-    announce = subscribe = watch_alive = declare_alive = ask = ask_cache = ignore
+    announce = subscribe = subscribe_live = watch_alive = declare_alive = ask = ask_cache = ignore
 
 
 @pytest.mark.parametrize("changes", [[], ["filters.box.transfer=predictor"]], ids=["plain", "transfer"])

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
+from lsu_mesh_services.mesh_start import MeshStart
 from lsu_mesh_services.peer import Peer
 from ports import free_port
 
@@ -32,7 +33,7 @@ def test_a_flood_does_not_keep_a_peer_from_its_steps_and_it_says_how_long_messag
         Bus(SessionSettings(connect=(endpoint,), cache=2 * FLOOD), clock) as bus,
     ):
         node = FilterNode(configuration, "box", "1" * 16)
-        peer = Peer(node, bus, clock)
+        peer = Peer(node, bus, clock, MeshStart(configuration, "filter", "box"))
         peer.declare()
         address, digest = key("demo", "input", "plant"), configuration.digest()
         for k in range(1, FLOOD + 1):

@@ -21,9 +21,10 @@ from lsu_mesh.mesh.estimation.step_record import Combined, Step, published_conte
 from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.warm_up import warm_up
 from lsu_mesh.mesh.messages import Bounds, Input, Measurement, Message, Posterior, SupportMessage
-from lsu_mesh.mesh.nodes.node import Complaint
+from lsu_mesh.mesh.nodes.node import About, Complaint
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key
-from lsu_mesh.mesh.nodes.starting import START_GRACE, About, StartingNode
+from lsu_mesh.mesh.nodes.starting import START_GRACE, StartingNode
+from lsu_mesh.mesh.nodes.useless_data import USELESS, UselessData
 from lsu_mesh.mesh.sets import to_message
 
 __all__ = ["START_GRACE", "Estimator"]
@@ -43,6 +44,12 @@ class Estimator(StartingNode):
     ) -> None:
         super().__init__(configuration, name, boot, engine=engine, sources=sources)
         self._source_timeouts = SourceTimeouts(configuration, self.subscriptions(), sources)
+        kinds = dict.fromkeys(configuration.sensors, "sensor") | dict.fromkeys(configuration.filters, "filter")
+        kinds |= dict.fromkeys(configuration.fusion, "fusion")
+        reach = ("history" if self.role == "filter" else "max_lag", self.history)
+        self.useless = UselessData({name: kinds[name] for name in sources}, configuration.mesh.rate, reach)
+        """Sources that send nothing of use."""
+        self.admission.datum_refused = self.useless.record_refused
         self._has_more = False
         """Whether the last tick has left steps that may be ready."""
         self.last_posterior: Posterior | None = None
@@ -94,13 +101,22 @@ class Estimator(StartingNode):
 
     # -- messages in
 
+    def record_alive(self, name: str, is_there: bool, now: int) -> None:
+        """Whoever has left is not waited for."""
+        super().record_alive(name, is_there, now)
+        if name in self.sources:
+            (self.absent.discard if is_there else self.absent.add)(name)
+
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""
         self._source_timeouts.received(source, now)
+        newest, future = self.timeline.arrivals.newest, self.timeline.from_the_future
         step = self.timeline.see(message.step, now)
         if step is None:
-            self._counts["late"] += 1
+            self._counts["late"] += self.timeline.from_the_future == future
+            self.useless.record_off(source, newest - message.step, now)
             return
+        self.useless.record_used(source)
         if isinstance(message, Measurement) and source in self.sources and not step.takes(message):
             return
         step.arrived[source] = message
@@ -122,6 +138,17 @@ class Estimator(StartingNode):
         return []
 
     # -- the course of steps
+
+    def warnings(self, now: int) -> list[Message]:
+        """As of every node, and whose data are all of no use, or of use again."""
+        found = super().warnings(now)
+        for news in self.useless.take_news(now):
+            about: About = {"source": news.source, "reason": news.reason, "seconds": news.seconds}
+            if news.code == USELESS:
+                found.append(self.warning(news.code, news.text, now, about=about))
+            else:
+                found.append(self.event("INFO", news.code, news.text, now=now, step=self.step(), about=about))
+        return found
 
     def advance(self, now: int) -> list[Message]:
         dirty = self.timeline.take_dirty()
@@ -145,7 +172,7 @@ class Estimator(StartingNode):
                 messages += self._close(k, step, now)
             if not self._predict(k, step, now):
                 if self.timeline.input_is_lost(k):
-                    self._start_over(k, f"the input of step {k} is lost", now)
+                    self._start_over_behind_lost_inputs(k, now)
                 break
             messages += self._take_remarks()
             if step.published is not None and not self.held.unsound and not self.timeline.is_behind():
@@ -155,6 +182,11 @@ class Estimator(StartingNode):
             if self._has_more:
                 break
         return messages + self._take_remarks()
+
+    def _start_over_behind_lost_inputs(self, k: int, now: int) -> None:
+        last = self.timeline.last_lost_input(k)
+        words = f"the input of step {k} is lost" if last == k else f"the inputs of steps {k} to {last} are lost"
+        self._start_over(last, words, now)
 
     def _steps_at_once(self) -> int:
         """A backlog stays bounded whatever comes: what is too much waits in the queue in front of the node."""
@@ -292,6 +324,7 @@ class Estimator(StartingNode):
     def complaints(self, now: int) -> list[Complaint]:
         """As of every node, how far it is behind, and which sources have fallen silent."""
         found = super().complaints(now)
+        found += [Complaint("WARN", text) for text in self.useless.complaints(now)]
         newest = self.timeline.arrivals.newest
         if self.current is not None and self.timeline.is_behind():
             late, unpublished = newest - self.current, self._counts["behind"]
@@ -304,7 +337,11 @@ class Estimator(StartingNode):
 
     def counters(self) -> dict[str, float]:
         future, newest = self.timeline.from_the_future, self.timeline.arrivals.newest
-        return self._counts | {"from the future": future, "epoch": self.held.epochs.number, "newest": newest}
+        return (
+            self._counts
+            | self.useless.counters
+            | {"from the future": future, "epoch": self.held.epochs.number, "newest": newest}
+        )
 
     def noise_bounds(self, factor: float = 1.0) -> Bounds:
         """rho and r in force; r of this step widened by ``factor``."""

@@ -37,9 +37,8 @@ from lsu_mesh.mesh.messages import (
 )
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter_events import dropped_event, rejected_event, widened_event
-from lsu_mesh.mesh.nodes.node import SECOND
+from lsu_mesh.mesh.nodes.node import SECOND, About
 from lsu_mesh.mesh.nodes.source_timeout import input_key
-from lsu_mesh.mesh.nodes.starting import About
 from lsu_mesh.mesh.sets import to_message
 
 
@@ -124,8 +123,11 @@ class FilterNode(Estimator):
             self.take_candidate(message)
 
     def _receive_measurement(self, message: Measurement, now: int) -> list[Message]:
+        self.useless.record_step(message.name, message.step, now)
         if message.step < 1:
             self._received.count(Unused(message, BEFORE_PRIOR))
+            late_ns = self.configuration.grid.time_of(max(1, self.timeline.arrivals.newest)) - message.time_ns
+            self.useless.record_seconds(message.name, BEFORE_PRIOR, late_ns / SECOND, now=now)
             return []
         first = None if is_timed(message) else self.timeline.untimed(message.step, message.name)
         if first is None:

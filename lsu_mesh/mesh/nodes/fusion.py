@@ -26,8 +26,8 @@ from lsu_mesh.mesh.estimation.step_record import Combined, Status, Step
 from lsu_mesh.mesh.estimation.transfer import SOUND
 from lsu_mesh.mesh.messages import Fused, Input, Message, Posterior, Rejection, SupportMessage
 from lsu_mesh.mesh.nodes.estimator import Estimator
-from lsu_mesh.mesh.nodes.node import SECOND, Complaint
-from lsu_mesh.mesh.nodes.starting import START_GRACE, About
+from lsu_mesh.mesh.nodes.node import SECOND, About, Complaint
+from lsu_mesh.mesh.nodes.starting import START_GRACE
 
 FAR_BEHIND_S, FAR_BEHIND = 2.0, 256
 """A fusion that is farther behind, in time at the mesh's rate or in steps, continues where its sources are."""

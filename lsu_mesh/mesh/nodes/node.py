@@ -11,10 +11,13 @@ from typing import Any, ClassVar, NamedTuple
 
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS, DuplicateProcess
+from lsu_mesh.mesh.duplicate_publishers import DuplicatePublisher, DuplicatePublishers
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import VERSION, Event, Health, Message
 
 SECOND = 1_000_000_000
+About = dict[str, str | int | float | None]
 REMEMBERED_NS = 5 * SECOND
 """So long an event or a refusal colours the health."""
 PATIENCE_NS, LONG_NS = SECOND // 2, 5 * SECOND
@@ -82,7 +85,10 @@ class Node(ABC):
         self._waiting_since: int | None = None
         self.gauges: dict[str, float] = {"links": 0.0}
         """What the service around it measures, told with the counters: links, queue, queue_ms, dropped, step_ms."""
-        self.admission = Admission(configuration, {*(topic for topic, _ in self.subscriptions()), *self.answers})
+        topics = {*(topic for topic, _ in self.subscriptions()), *self.answers, "health"}
+        self.admission = Admission(configuration, topics)
+        self._publishers = self.admission.publishers = DuplicatePublishers(configuration.cached)
+        self._other_process = DuplicateProcess(f"{self.role}/{name}", boot)
 
     @abstractmethod
     def subscriptions(self) -> Sequence[tuple[str, str]]:
@@ -99,16 +105,45 @@ class Node(ABC):
     def deliver(self, address: str, payload: bytes, now: int) -> list[Message]:
         """Admission and :meth:`receive`."""
         message = self.admission.admit(address, payload, now)
+        if isinstance(message, Health):  # of the own name: another process
+            self._other_process.record(message, self.started_ns, now)
+            return []
         return [] if message is None else self.receive(message, now)
+
+    def record_alive(self, name: str, is_there: bool, now: int) -> None:
+        """The liveliness token of another peer came or went."""
+        self._publishers.record_alive(name, is_there, now)
 
     def tick(self, now: int) -> list[Message]:
         """:meth:`advance`, and a health message once a second."""
         messages = self.advance(now)
+        if warnings := self.warnings(now):
+            messages = [*messages, *warnings]
+            self.next_health = now  # whoever reads the health is told at once
         self._waited(now)
         if now >= self.next_health:
             self.next_health = now + SECOND
             messages.append(self.health(now))
         return messages
+
+    def warnings(self, now: int) -> list[Message]:
+        """Events about what has just been found wrong around the node, and stands in its health as long as it is so."""
+        found = [self._duplicate_publisher(pair, now) for pair in self._publishers.take_news()]
+        text, other = self._other_process.take_news(now), self._other_process.other(now)
+        if text is not None and other is not None:
+            about: About = {"peer": f"{self.role}/{self.name}", "host": other.host, "boot": other.boot}
+            found.append(self.warning(DUPLICATE_PROCESS, text, now, about=about))
+        return found
+
+    def warning(self, code: str, text: str, now: int, *, about: About) -> Event:
+        """An event about what a complaint tells as long as it is so: the health needs no memory of it."""
+        event = self.event("WARN", code, text, now=now, step=self.step(), about=about)
+        del self._warnings["WARN", code]
+        return event
+
+    def _duplicate_publisher(self, pair: DuplicatePublisher, now: int) -> Message:
+        about: About = {"peer": pair.src, "key": pair.key, "used": pair.used, "refused": pair.refused}
+        return self.warning("duplicate-publisher", pair.words, now, about=about)
 
     def warm_up(self) -> None:
         """Do once, and forget, what a step does, so that the first real step finds all kernels loaded."""
@@ -166,7 +201,7 @@ class Node(ABC):
         text: str,
         now: int,
         step: int,
-        about: dict[str, str | int | float | None],
+        about: About,
     ) -> Event:
         """A message for people; WARN and ERROR also colour the health of the next seconds."""
         if level != "INFO":
@@ -203,6 +238,9 @@ class Node(ABC):
             found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {self.admission.last_refusal}"))
         if self._dropped.is_recent(dropped, now):
             found.append(Complaint("WARN", f"{dropped:g} message(s) so far found the queue full and were dropped"))
+        found += [Complaint("WARN", pair.words) for pair in self._publishers.present(now)]
+        if (twice := self._other_process.complaint(now)) is not None:
+            found.append(Complaint("WARN", twice))
         queued_s = self.gauges.get("queue_ms", 0.0) * 1e-3
         if queued_s > PATIENCE_NS / SECOND:
             found.append(Complaint("WARN", f"messages wait {queued_s:.1f} s in its queue"))

@@ -20,7 +20,6 @@ from lsu_mesh.mesh.sets import to_support
 from lsu_mesh.mesh.time_requirements import check_times
 from lsu_mesh.supports.support import Support
 
-About = dict[str, str | int | float | None]
 START_GRACE = SECOND // 2
 """How long a late joiner listens to the past before it chooses where to start."""
 

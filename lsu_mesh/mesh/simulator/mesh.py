@@ -10,7 +10,6 @@ from typing import NamedTuple
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.keys import key as key_of
 from lsu_mesh.mesh.messages import Message, Reference, encode
-from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import SECOND, Node
@@ -106,7 +105,7 @@ class Process:
             return
         self.next_run = None
         for name, is_there in self._presence:
-            self._apply_presence(name, is_there)
+            self.node.record_alive(name, is_there, self.clock(at))
         self._presence.clear()
         inbox, self._inbox = self._inbox, []
         for arrival in inbox:
@@ -128,13 +127,6 @@ class Process:
             return []
         self._mesh.witness.admitted(self.node, message)
         return self.node.receive(message, arrival.at)
-
-    def _apply_presence(self, name: str, is_there: bool) -> None:
-        if isinstance(self.node, Estimator) and name in self.node.sources:
-            if is_there:
-                self.node.absent.discard(name)
-            else:
-                self.node.absent.add(name)
 
     def _publish(self, messages: Sequence[Message], at: int) -> None:
         for message in messages:

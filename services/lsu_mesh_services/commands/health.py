@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
@@ -18,7 +19,7 @@ from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
 from lsu_mesh_services.mesh_start import find_start
 from lsu_mesh_services.network.receive_queue import Arrival
-from lsu_mesh_services.session import session_settings, with_session
+from lsu_mesh_services.session import connection_report, session_settings, with_session
 
 SHOWN = ("received", "gaps", "duplicates", "dropped", "late", "rewinds", "contradictions", "behind", "queue", "step_ms")
 """Counters with a column of their own; refusals are summed, and listed by reason below the table."""
@@ -42,7 +43,8 @@ def _listen(configuration: Configuration, options: argparse.Namespace) -> list[P
     """Heartbeats and liveliness of so many seconds, judged at their end."""
     clock, mesh = Clock(), configuration.mesh.name
     observer = HealthObserver(configuration, clock.now())
-    with Bus(session_settings(configuration, options), clock) as bus:
+    settings = session_settings(configuration, options)
+    with Bus(settings, clock) as bus, connection_report("health", bus, settings, says_connected=False):
         configuration = find_start(configuration, bus, clock, options.seconds) or configuration.started(0)
         admission = Admission(configuration, ("health",))
         bus.subscribe(f"{PREFIX}/{mesh}/health/*")
@@ -72,7 +74,8 @@ def print_json(peers: Sequence[PeerHealth]) -> None:
     for peer in peers:
         about = {"name": peer.name, "role": peer.role, "level": peer.level, "reasons": list(peer.reasons)}
         age = None if peer.age_ns is None else peer.age_ns / SECOND
-        more = {"counters": dict(peer.counters), "started_ns": peer.started_ns, "host": peer.host}
+        more: dict[str, object] = {"counters": dict(peer.counters), "started_ns": peer.started_ns, "host": peer.host}
+        more["processes"] = [asdict(process) for process in peer.processes]
         print(json.dumps(about | {"step": peer.step, "age_s": age} | more))
 
 

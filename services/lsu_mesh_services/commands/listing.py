@@ -6,9 +6,12 @@ import argparse
 import json
 import sys
 from collections.abc import Mapping
+from dataclasses import asdict
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.flows import Flow, flows
+from lsu_mesh.mesh.messages import Health
+from lsu_mesh.mesh.processes import Process, Processes, words_of
 from lsu_mesh_services.exit_codes import OK
 from lsu_mesh_services.monitoring.stream_statistics import StreamStatistics
 from lsu_mesh_services.monitoring.subscriber import run_tool, watching
@@ -22,6 +25,7 @@ def _list(configuration: Configuration, options: argparse.Namespace) -> int:
     published = flows(configuration)
     beats = {flow.address: StreamStatistics() for flow in published}
     there: set[str] = set()
+    processes = Processes()
     with watching(configuration, options) as watch:
         watch.listen([(flow.topic, flow.name) for flow in published])
         for heard in watch.received(options.seconds):
@@ -32,20 +36,33 @@ def _list(configuration: Configuration, options: argparse.Namespace) -> int:
             else:
                 beat = beats[f"{heard.topic}/{heard.name}"]
                 beat.record(heard.arrival_ns, heard.message.sent_ns, heard.size, heard.message.step)
+                if isinstance(heard.message, Health):
+                    processes.record(heard.message, heard.arrival_ns)
+        now = watch.clock.now()
         watch.tell_refused()
     roles = {name: role for role, name in configuration.peers()}
+    running = {name: processes.of(name, now) for name in [*roles, *sorted(there - set(roles))]}
     if options.json:
-        _print_json(published, beats, roles, there)
+        _print_json(published, beats, roles, there=there, running=running)
     else:
         _print_table(published, beats, roles, there=there, seconds=options.seconds)
+        for name, of_name in running.items():
+            if len(of_name) > 1:
+                print(f"{name} ({roles.get(name, 'not of this configuration')}): {words_of(of_name)}; stop all but one")
     return OK
 
 
 def _print_json(
-    published: list[Flow], beats: Mapping[str, StreamStatistics], roles: Mapping[str, str], there: set[str]
+    published: list[Flow],
+    beats: Mapping[str, StreamStatistics],
+    roles: Mapping[str, str],
+    *,
+    there: set[str],
+    running: Mapping[str, list[Process]],
 ) -> None:
-    for name in [*roles, *sorted(there - set(roles))]:
-        print(json.dumps({"type": "peer", "name": name, "role": roles.get(name), "there": name in there}))
+    for name, processes in running.items():
+        about = {"type": "peer", "name": name, "role": roles.get(name), "there": name in there}
+        print(json.dumps(about | {"processes": [asdict(process) for process in processes]}))
     for flow in published:
         beat = beats[flow.address]
         if beat.count:

@@ -6,7 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 from lsu_mesh.mesh.access import PUBLISHES
@@ -160,6 +160,7 @@ def record(row: Row) -> dict[str, Any]:
         "step": row.step, "rate_hz": row.rate, "latency_ms": row.latency_ms, **counters,
         "age_s": None if health.age_ns is None else health.age_ns / SECOND,
         "started_ns": health.started_ns, "host": health.host,
+        "processes": [asdict(process) for process in health.processes],
     }  # fmt: skip
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import TYPES, Event, Health, Message, Posterior, Truth
+from lsu_mesh.mesh.processes import Processes, words_of
 
 KEPT_STEPS, KEPT_TRUTHS = 8192, 65536
 """Steps that an estimate may be revised in, and be judged in by a truth that comes later."""
@@ -128,6 +129,9 @@ class RunReport:
         self.source_steps: dict[str, int] = {}
         self.links: dict[str, int] = {}
         """How many others each peer is connected to."""
+        self.duplicates: dict[str, str] = {}
+        """Peers that ran more than once, and where."""
+        self._processes = Processes()
         self.used: set[str] = set()
         """Names of those whose messages went into an estimate."""
 
@@ -146,11 +150,17 @@ class RunReport:
         elif isinstance(message, Event):
             self.events.append(message)
         elif isinstance(message, Health):
+            self._record_processes(message, arrival_ns)
             self.links[message.name] = int(message.counters.get("links", 0))
             if message.name in self.tracks:
                 self.tracks[message.name].health = message
             elif message.role in ("plant", "sensor"):
                 self.source_steps[message.name] = message.step
+
+    def _record_processes(self, message: Health, arrival_ns: int) -> None:
+        self._processes.record(message, arrival_ns)
+        if len(living := self._processes.of(message.name, arrival_ns)) > 1:
+            self.duplicates[message.src] = f"{message.src} ran as {words_of(living)}"
 
     def _record_truth(self, message: Truth) -> None:
         self._truth[message.step] = message.x

@@ -19,7 +19,7 @@ from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, USAGE
 from lsu_mesh_services.mesh_start import find_start
 from lsu_mesh_services.network.addresses import Addresses, WrongAddress
-from lsu_mesh_services.session import session_settings, with_session
+from lsu_mesh_services.session import connection_report, session_settings, with_session
 from lsu_mesh_services.stop import Stop
 
 LINK_S = 3.0
@@ -106,7 +106,7 @@ def watching(configuration: Configuration, options: argparse.Namespace) -> Itera
     """
     clock, settings = Clock(), session_settings(configuration, options)
     stop: Stop | None = getattr(options, "stop", None)
-    with Bus(settings, clock) as bus:
+    with Bus(settings, clock) as bus, connection_report(options.command, bus, settings, says_connected=False):
         end = clock.now() + int(LINK_S * SECOND)
         while not bus.links() and not stop:
             if clock.now() > end:

@@ -44,7 +44,8 @@ def test_a_sensor_sends_its_own_keys_and_the_advanced_messages_beside_them(rules
     assert of(rules, "s1", "put", "ingress") == own | {f"{key}/@adv/**" for key in own}
     assert of(rules, "s1", "reply", "ingress") == own | {f"{key}/@adv/**" for key in own}
     assert of(rules, "s1", "put", "egress") == {
-        "lsu/v1/demo/truth/plant", "lsu/v1/demo/truth/plant/@adv/**", "lsu/v1/demo/model",
+        "lsu/v1/demo/truth/plant", "lsu/v1/demo/truth/plant/@adv/**", "lsu/v1/demo/health/s1",
+        "lsu/v1/demo/health/s1/@adv/**", "lsu/v1/demo/model",
     }  # fmt: skip
 
 
