@@ -20,7 +20,7 @@ FILE = "x.rrd"
 NEEDS = (
     (MESH, (
         "run --no-record", "run", "plant", "sensor s1", "filter cz", "fusion main", "identifier x", "router", "list",
-        "echo posterior", "hz posterior", "top", "health", "graph --live", "keys init m.toml",
+        "echo posterior", "hz posterior", "top", "publish gauge", "health", "graph --live", "keys init m.toml",
     )),
     (RECORD, (
         f"run --record {FILE}", "run --view", "run --web", "recorder", f"view {FILE}", f"replay {FILE}",
