@@ -55,7 +55,9 @@ def _safe_value(name: str, value: Any) -> Any:
         return _safe(value)
     if name == "base" and isinstance(value, list | tuple):
         return _reference(value)
-    return [_reference(one) for one in value] if name == "used" else value
+    if name == "used" and isinstance(value, list | tuple):
+        return [_reference(one) for one in value]
+    return value
 
 
 def _reference(value: list[Any] | tuple[Any, ...]) -> list[Any]:

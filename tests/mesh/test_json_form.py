@@ -39,6 +39,11 @@ def test_times_that_an_event_is_about_are_strings_too() -> None:
     assert whole(event, 1)["about"] == {"start_ns": "1700000000000000001", "gap": 0.5, "step": 3}
 
 
+def test_what_an_event_is_about_may_have_the_names_of_references() -> None:
+    about: dict[str, str | int | float | None] = {"used": "0123456789abcdef", "base": "prior"}
+    assert whole(structs.replace(example("event"), about=about), 1)["about"] == about
+
+
 def test_a_whole_posterior_has_its_set_and_provenance() -> None:
     told = whole(example("posterior"), 1)
     assert told["support"] == {"type": "orthotope", "lower": [-0.25, 0.5], "upper": [0.75, 1.0]}
