@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import shutil
 import threading
 import time
@@ -125,7 +126,7 @@ class LiveMesh:
         if star:
             make_files(self.configuration, LOOPBACK_HOSTS, days=2)
         settings = SupervisorSettings(restart=True, backoff=0.0, limit=10**6)
-        environment = {"PYTHONPATH": str(ROOT), "CI": "true"}
+        environment = {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "services")]), "CI": "true"}
         self.supervisor = Supervisor(settings, environment)
         self.clock = Clock()
         self.observer = observer(self.configuration)

@@ -78,7 +78,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.fusion": [("intersection", "point"), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
-        ("message_examples", "sets", "data_files"),
+        ("message_examples", "sets", "data_files", "ros2", "json_form"),
         ("config",),
         (
             "access",
@@ -96,6 +96,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("estimation",),
         ("nodes",),
         ("observer", "replay", "verification"),
+        ("ros2_telling",),
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [
@@ -131,13 +132,14 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         (REST,),
     ],
     "lsu_mesh_services": [
-        ("exit_codes", "extras", "stop", "supervisor"),
+        ("exit_codes", "extras", "stop", "supervisor", "client"),
         ("options",),
         ("network",),
         ("bus",),
         ("session", "configuration", "mesh_start"),
         ("recording", "monitoring"),
-        ("viewers", "peer", "recorder", "played_files", "new_mesh"),
+        ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
+        ("ros2",),
         ("mesh_launcher",),
         ("replay",),
         ("commands",),
@@ -249,11 +251,20 @@ def test_the_library_imports_neither_zenoh_nor_rerun_nor_messagepack(root: Path)
             assert not tops & {"msgspec", "msgpack"}, name
 
 
-def test_only_the_bus_imports_zenoh_and_only_the_recording_imports_rerun(root: Path) -> None:
+def test_only_the_bus_and_the_client_import_zenoh_and_only_the_recording_imports_rerun(root: Path) -> None:
     for name, path in modules(root).items():
         tops = {imported.split(".")[0] for imported in imports(path)}
-        assert ("zenoh" in tops) <= (name == "lsu_mesh_services.bus"), name
+        assert ("zenoh" in tops) <= (name in ("lsu_mesh_services.bus", "lsu_mesh_services.client")), name
         assert ("rerun" in tops) <= name.startswith("lsu_mesh_services.recording"), name
+
+
+def test_the_client_is_one_file_that_can_be_copied(root: Path) -> None:
+    tops = {name.split(".")[0] for name in imports(root / "services" / "lsu_mesh_services" / "client.py")}
+    assert tops - set(sys.stdlib_module_names) == {"zenoh", "msgpack", "numpy"}, "numpy only where it is asked for"
+    heavy = ("numpy", "msgspec", "lsu_mesh", "asyncio", "ssl")
+    check = f"import lsu_mesh_services.client, sys\nprint([name for name in {heavy} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from lsu_mesh_services.extras import EXTRAS
+from lsu_mesh_services.gateway.application import PAGE
 
 BUILD = "import sys; from hatchling import build as b; print(b.build_{kind}(sys.argv[1]))"
 STRAYS = (
@@ -86,7 +87,8 @@ def test_a_wheel_installs_our_two_packages_with_their_data_and_nothing_else(whee
     }
     assert set(wheel) - metadata == packages
     others = {name for name in packages if not name.endswith(".py")}
-    assert others == {"lsu_mesh/py.typed", "lsu_mesh_services/py.typed", "lsu_mesh_services/demo.toml"}
+    page = {f"lsu_mesh_services/gateway/page/{name}" for name in PAGE}
+    assert others == page | {"lsu_mesh/py.typed", "lsu_mesh_services/py.typed", "lsu_mesh_services/demo.toml"}
     assert b"lsu-mesh = lsu_mesh_services.cli:entry" in b"".join(wheel[name] for name in metadata)
 
 
@@ -112,10 +114,11 @@ def names(requirements: list[str]) -> list[str]:
 
 def test_the_extras_are_those_that_commands_look_for(root: Path) -> None:
     declared = {extra: names(listed) for extra, listed in project(root)["optional-dependencies"].items()}
-    assert declared["record"][0] == "lsu-mesh[mesh]"
-    declared["record"][:1] = declared["mesh"]
+    for extra, inner in (("record", "mesh"), ("ros2", "mesh"), ("gateway", "mesh"), ("mcap", "record")):
+        assert declared[extra][0] == f"lsu-mesh[{inner}]"
+        declared[extra][:1] = declared[inner]
     assert {extra.name: list(extra.modules) for extra in EXTRAS} == {
-        name: declared[name] for name in ("mesh", "record")
+        name: declared[name] for name in ("mesh", "record", "ros2", "gateway", "mcap")
     }
     base = names(project(root)["dependencies"])
     assert base == ["numpy", "scipy", "numba", "msgspec", "rich"]
@@ -125,4 +128,4 @@ def test_every_requirement_has_a_tested_version(root: Path) -> None:
     pinned = {line.split("==")[0] for line in (root / "constraints.txt").read_text().splitlines() if "==" in line}
     wanted = set(names(project(root)["dependencies"]))
     wanted |= {name for listed in project(root)["optional-dependencies"].values() for name in names(listed)}
-    assert wanted - {"lsu-mesh[mesh]"} <= pinned
+    assert {name for name in wanted if not name.startswith("lsu-mesh[")} <= {name.replace("_", "-") for name in pinned}

@@ -20,6 +20,10 @@ class SensorRows(Struct, frozen=True, kw_only=True, omit_defaults=True):
     d: list[float] | None = None
     period: list[float] | None = None
     """y is known up to multiples of it; 0 where an output has none."""
+    source: str = "simulated"
+    """Where its measurements come from; a program may send those of an ``external`` one only."""
+    time_error_ns: int = 0
+    """What is not known of its times: whoever sends its measurements adds it to each ``time_error_ns``."""
 
 
 class Dynamics(Struct, frozen=True, kw_only=True):
@@ -64,11 +68,15 @@ class ModelAnswer(Struct, frozen=True, kw_only=True):
     """The rates of a continuous model; ``None`` for a discrete one."""
     schedule: list[LaterModel] | None = None
     """Models that replace this one later."""
+    dt_exact: str | None = None
+    """``dt`` as a fraction of seconds, such as ``1/30``; ``None``: the decimal of ``dt``."""
+    plant: str | None = None
+    """Name of the plant whose inputs a program sends; ``None``: no program may."""
 
 
 def model_answer(configuration: Configuration, boot: str | None = None) -> ModelAnswer:
     """What every estimator of a mesh answers: the declared model, and when the mesh has started."""
-    model = configuration.base_model
+    model, plant = configuration.base_model, configuration.plant
     return ModelAnswer(
         boot=boot,
         model=configuration.digest(),
@@ -83,11 +91,13 @@ def model_answer(configuration: Configuration, boot: str | None = None) -> Model
             name: SensorRows(
                 C=[list(row) for row in sensor.C], r=list(sensor.r), outputs=list(sensor.outputs),
                 D=[list(row) for row in sensor.D] or None, d=list(sensor.offset) or None,
-                period=list(sensor.period) or None,
+                period=list(sensor.period) or None, source=sensor.source, time_error_ns=sensor.time_error_ns,
             )
             for name, sensor in configuration.sensors.items()
         },
         start_ns=configuration.mesh.start_ns,
+        dt_exact=str(configuration.grid.dt),
+        plant=plant.name if plant is not None and plant.is_external else None,
         offset=None if model.a is None else model.a.tolist(),
         continuous=None if configuration.continuous is None else _dynamics(configuration.continuous),
         schedule=[LaterModel(first=one.first, model=_dynamics(one.model)) for one in configuration.schedule] or None,

@@ -59,10 +59,10 @@ class Clock:
 class Bus:
     """A session with queued arrivals. Use it as a context manager."""
 
-    def __init__(self, settings: SessionSettings, clock: Clock) -> None:
+    def __init__(self, settings: SessionSettings, clock: Clock, arrivals: ReceiveQueue | None = None) -> None:
         self._settings = settings
         self._clock = clock
-        self._arrivals = ReceiveQueue()
+        self._arrivals = ReceiveQueue() if arrivals is None else arrivals
         self._publishers: dict[str, Any] = {}
         self._declared: list[Any] = []
         self._own_tokens: set[str] = set()
@@ -119,6 +119,44 @@ class Bus:
 
     def _enqueue_sample(self, sample: Any) -> None:
         self._arrivals.put(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
+
+    @property
+    def arrivals(self) -> ReceiveQueue:
+        """The queue, for a session with another network whose arrivals shall come in the same order."""
+        return self._arrivals
+
+    @property
+    def zid(self) -> str:
+        """The session's identifier in Zenoh."""
+        return str(self._session.zid())
+
+    def subscribe_plain(self, key: str, what: str) -> None:
+        """Queue, with attachments, what is published from now on by programs that know nothing of the mesh."""
+
+        def came(sample: Any) -> None:
+            attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
+            now, payload = self._clock.now(), sample.payload.to_bytes()
+            self._arrivals.put(Arrival(what, str(sample.key_expr), payload, now, attachment=attachment))
+
+        self._declared.append(self._session.declare_subscriber(key, came))
+
+    def announce_plain(self, key: str) -> None:
+        """Declare a publisher for programs that know nothing of the mesh."""
+        drop = zenoh.CongestionControl.DROP
+        self._publishers[key] = self._session.declare_publisher(key, congestion_control=drop)
+
+    def put_plain(self, key: str, payload: bytes, attachment: bytes | None) -> None:
+        """Send to those who listen now, by a publisher of :meth:`announce_plain`."""
+        self._publishers[key].put(payload, attachment=attachment)
+
+    def watch_tokens(self, key: str, there: str, gone: str) -> None:
+        """Queue whose tokens are there and which come and go."""
+
+        def changed(sample: Any) -> None:
+            what = there if sample.kind == zenoh.SampleKind.PUT else gone
+            self._arrivals.put(Arrival(what, str(sample.key_expr), b"", self._clock.now()))
+
+        self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
 
     def keep(self, count: int) -> None:
         """How many messages publishers that are declared from now on keep for those who come late."""
@@ -300,8 +338,10 @@ def _security(files: Certificates) -> dict[str, object]:
 def _explained(settings: SessionSettings, error: str) -> str:
     if "in use" in error.lower() or "listen" in error.lower():
         listened = ", ".join(settings.listen)
+        router = " (rmw_zenohd, the router of ROS 2, and zenohd listen on 7447)" if ":7447" in listened else ""
         return (
             f"cannot listen on {listened}: {error}\n"
-            'Another process holds the port; stop it, or choose another one with -X network.entry="tcp/127.0.0.1:PORT"'
+            f"Another process holds the port{router}; stop it, or choose another one with "
+            '-X network.entry="tcp/127.0.0.1:PORT"'
         )
     return f"no Zenoh session: {error}"

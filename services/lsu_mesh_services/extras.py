@@ -30,7 +30,13 @@ class Extra(NamedTuple):
 
 MESH = Extra("mesh", {"eclipse-zenoh": "zenoh", "msgpack": "msgpack", "cryptography": "cryptography"})
 RECORD = Extra("record", {**MESH.modules, "rerun-sdk": "rerun", "pyarrow": "pyarrow"})
-EXTRAS = (MESH, RECORD)
+ROS2 = Extra("ros2", {**MESH.modules, "rosbags": "rosbags", "xxhash": "xxhash"})
+GATEWAY = Extra(
+    "gateway",
+    {**MESH.modules, "starlette": "starlette", "uvicorn": "uvicorn", "prometheus-client": "prometheus_client"},
+)
+MCAP = Extra("mcap", {**RECORD.modules, "mcap": "mcap"})
+EXTRAS = (MESH, RECORD, ROS2, GATEWAY, MCAP)
 
 Need: TypeAlias = Extra | Callable[[argparse.Namespace], Extra | None] | None
 """What a command says as ``extra``: the one it needs, how its options decide that, or None."""

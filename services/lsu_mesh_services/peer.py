@@ -6,6 +6,8 @@ import gc
 import socket
 import sys
 from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Protocol
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
@@ -31,6 +33,19 @@ MAX_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
 
+class Beside(Protocol):
+    """A part in another network, whose arrivals come through the queue of the peer."""
+
+    def look(self) -> None:
+        """Note how it is connected; called ten times a second."""
+
+    def take(self, arrival: Arrival) -> list[Message] | None:
+        """What to publish after an arrival; None where it is not of that network."""
+
+
+OpenBeside = Callable[[Node, Bus, Clock], AbstractContextManager[Beside]]
+
+
 def run_peer(
     configuration: Configuration,
     who: tuple[str, str],
@@ -38,6 +53,7 @@ def run_peer(
     *,
     settings: SessionSettings,
     stop: Stop,
+    beside: OpenBeside | None = None,
 ) -> int:
     """Run the node of ``(role, name)`` until it is told to stop; returns the exit code.
 
@@ -58,20 +74,23 @@ def run_peer(
                 node = make(started)
                 if node is None:
                     return USAGE
-            _run(node, bus, clock, stop=stop, start=start, is_moved=known_ns is not None)
+            with nullcontext() if beside is None else beside(node, bus, clock) as other:
+                _run(node, bus, clock, stop=stop, start=start, is_moved=known_ns is not None, beside=other)
         if start.other_ns is None:
             return OK
         known_ns, node = start.other_ns, None
 
 
-def _run(node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is_moved: bool) -> None:
+def _run(
+    node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is_moved: bool, beside: Beside | None
+) -> None:
     """Until the process is told to stop, or the mesh turns out to have another start."""
     node.started_ns, node.host = clock.now(), socket.gethostname()
     node.warm_up()
     gc.collect()
     gc.freeze()  # what is loaded stays: no later collection looks through all of it in the middle of a step
     bus.keep(node.configuration.cached * node.messages_per_step)
-    peer = Peer(node, bus, clock, start)
+    peer = Peer(node, bus, clock, start, beside=beside)
     peer.declare()
     if is_moved:
         peer.tell_moved()
@@ -90,8 +109,9 @@ def _run(node: Node, bus: Bus, clock: Clock, *, stop: Stop, start: MeshStart, is
 class Peer:
     """The loop around a node: drain the queue, tick, publish."""
 
-    def __init__(self, node: Node, bus: Bus, clock: Clock, start: MeshStart) -> None:
+    def __init__(self, node: Node, bus: Bus, clock: Clock, start: MeshStart, *, beside: Beside | None = None) -> None:
         self._node = node
+        self._beside = beside
         self._start = start
         self._bus = bus
         self._clock = clock
@@ -191,6 +211,8 @@ class Peer:
         if now < self._next_look:
             return
         self._next_look = now + LOOK_AT_LINKS_NS
+        if self._beside is not None:
+            self._beside.look()
         links = self._bus.links()
         if links != self._links:
             self._links = links
@@ -207,6 +229,8 @@ class Peer:
         return min(MAX_WAIT, max(0.0005, (wakeup - self._clock.now()) * 1e-9))
 
     def _take(self, arrival: Arrival) -> list[Message]:
+        if self._beside is not None and (found := self._beside.take(arrival)) is not None:
+            return found
         if arrival.what == "sample":
             if self._start.receives(arrival.key, arrival.payload):
                 return []

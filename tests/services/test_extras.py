@@ -13,14 +13,14 @@ import pytest
 from lsu_mesh_services import extras
 from lsu_mesh_services.cli import build_parser, main
 from lsu_mesh_services.exit_codes import COULD_NOT_START, NOT_MET, OK
-from lsu_mesh_services.extras import MESH, RECORD, Extra
+from lsu_mesh_services.extras import GATEWAY, MCAP, MESH, RECORD, ROS2, Extra
 from without_modules import without
 
 FILE = "x.rrd"
 NEEDS = (
     (MESH, (
         "run --no-record", "run", "plant", "sensor s1", "filter cz", "fusion main", "identifier x", "router", "list",
-        "echo posterior", "hz posterior", "top", "health", "graph --live", "keys init m.toml",
+        "echo posterior", "hz posterior", "top", "publish gauge", "health", "graph --live", "keys init m.toml",
     )),
     (RECORD, (
         f"run --record {FILE}", "run --view", "run --web", "recorder", f"view {FILE}", f"replay {FILE}",
@@ -28,6 +28,9 @@ NEEDS = (
         f"recording merge {FILE}", f"recording export {FILE} --format parquet", f"identify m.toml --recording {FILE}",
         "bench recording",
     )),
+    (ROS2, ("import drive.mcap", "bridge ros2")),
+    (GATEWAY, ("gateway", "gateway --http 127.0.0.1:0")),
+    (MCAP, (f"recording export {FILE} --format mcap",)),
 )  # fmt: skip
 NONE = (
     "validate m.toml",
@@ -102,7 +105,7 @@ def test_what_needs_no_extra_says_so(line: str, monkeypatch: pytest.MonkeyPatch)
 @pytest.fixture
 def bare(lsu_mesh_command: list[str], tmp_path: Path) -> object:
     """Runs a command where no module of an extra can be imported."""
-    folder = without(RECORD.modules.values(), tmp_path / "blocked")
+    folder = without([*RECORD.modules.values(), *ROS2.modules.values()], tmp_path / "blocked")
     paths = os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]).strip(os.pathsep)
 
     def run(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -27,6 +27,7 @@ from lsu_mesh.mesh.config.mesh_table import START_TIME, grid_of_table, read_mesh
 from lsu_mesh.mesh.config.network import check_reserved, open_endpoint_warnings, read_network
 from lsu_mesh.mesh.config.overrides import apply, from_environment, from_flags
 from lsu_mesh.mesh.config.problem import ConfigurationError, Problem, Problems
+from lsu_mesh.mesh.config.ros2 import check_ros2, ros2_warnings
 from lsu_mesh.mesh.config.sensors import read_plant, read_sensor
 from lsu_mesh.mesh.config.settings import (
     Configuration,
@@ -160,6 +161,8 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     check_reserved(network, names, problems)
     mesh = settle_start(mesh, root, plant, sensors=sensors)
     check_external_plant(plant, sensors, system, problems)
+    states = None if model is None else model.states
+    check_ros2(network, sensors, [*filters, *fusion], states, problems=problems)
     files = [*(sensor.file for sensor in sensors.values()), None if plant is None else plant.file]
     if any(file is not None and file.indexed_by == "time" for file in files) and not (
         mesh.start_ns is not None or mesh.starts_now
@@ -189,6 +192,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
                 (
                     *shared_sensor_warnings(problems.file, filters, fusion),
                     *open_endpoint_warnings(problems.file, network),
+                    *ros2_warnings(problems.file, network, sensors),
                     *live_source_warnings(
                         problems.file,
                         sensors,

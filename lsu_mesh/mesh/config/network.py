@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.problem import Problem, Problems
+from lsu_mesh.mesh.config.ros2 import read_ros2_network
 from lsu_mesh.mesh.config.settings import NetworkSettings, TlsSettings
 from lsu_mesh.mesh.config.table import Table
 from lsu_mesh.mesh.keys import RESERVED
@@ -41,8 +42,13 @@ def read_network(root: Table) -> NetworkSettings:
     for key, endpoints in (("entry", (entry,)), ("listen", listen), ("connect", connect)):
         _check_endpoints(table, key, endpoints, tls.enabled)
     cache = table.whole("cache", None, low=1, high=10**6)
+    ros2 = read_ros2_network(table)
+    given = table.values.get("ros2")
+    if isinstance(given, dict):
+        for key, endpoints in (("connect", ros2.connect), ("listen", ros2.listen)):
+            _check_endpoints(Table(given, "network.ros2", root.problems), key, endpoints, encrypted=False)
     table.finish()
-    return NetworkSettings(entry=entry, listen=listen, connect=connect, cache=cache, tls=tls)
+    return NetworkSettings(entry=entry, listen=listen, connect=connect, cache=cache, tls=tls, ros2=ros2)
 
 
 def _check_endpoints(table: Table, key: str, endpoints: Iterable[str], encrypted: bool) -> None:

@@ -5,21 +5,29 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 from lsu_mesh.mesh.config.data_file_keys import KEYS, read_file_format
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
 from lsu_mesh.mesh.config.problem import Problems, data_problem
+from lsu_mesh.mesh.config.ros2 import read_topic
 from lsu_mesh.mesh.config.sensor_parts import read_further_outputs, read_timing
-from lsu_mesh.mesh.config.settings import FaultKind, MeasurementFileSettings, PlantSettings, SensorFault, SensorSettings
+from lsu_mesh.mesh.config.settings import (
+    FaultKind,
+    MeasurementFileSettings,
+    PlantSettings,
+    SensorFault,
+    SensorSettings,
+    Source,
+)
 from lsu_mesh.mesh.config.system import System
 from lsu_mesh.mesh.config.table import REQUIRED, Table, file_at
 from lsu_mesh.mesh.keys import NAME_RULE, is_name
 from lsu_mesh.model import LSUModel
 
 INPUTS = ("normal", "sine", "zero")
-SOURCES: tuple[Literal["simulated", "file", "external"], ...] = ("simulated", "file", "external")
+SOURCES: tuple[Source, ...] = get_args(Source)
 FAULTS: tuple[FaultKind, ...] = get_args(FaultKind)
 
 
@@ -74,7 +82,8 @@ def read_sensor(table: Table, name: str, system: System, folder: Path) -> Sensor
     outputs = table.texts("outputs", default)
     if is_read and len(outputs) != len(rows):
         table.mismatch("outputs", f"{len(rows)} names, one per row of C", len(outputs))
-    source = table.choice("source", SOURCES, "file" if "file" in table.values else "simulated")
+    usual: Source = "file" if "file" in table.values else "simulated"
+    source = table.choice("source", SOURCES, usual)
     file = _read_file(table, len(rows), folder, "row of C")
     if source != "file" and file is not None:
         table.wrong("source", f'is "{source}", but a file is given; remove one of the two', '"file", or no file')
@@ -88,6 +97,7 @@ def read_sensor(table: Table, name: str, system: System, folder: Path) -> Sensor
         table.without("faults", "faults are simulated, and this sensor is not", "remove the key")
     further = read_further_outputs(table, len(rows) if is_read else None, system.model)
     timing = read_timing(table, len(rows) if is_read else None, system, is_simulated=source == "simulated")
+    topic = read_topic(table, len(rows) if is_read else None, is_used=source == "ros2")
     table.finish()
     return SensorSettings(
         name=name,
@@ -97,7 +107,8 @@ def read_sensor(table: Table, name: str, system: System, folder: Path) -> Sensor
         file=file,
         faults=faults,
         simulated_r=simulated,
-        live="external" if source == "external" else "",
+        live=source if source == "external" or source == "ros2" else "",
+        ros2=topic,
         **further,
         **timing,
     )

@@ -21,6 +21,7 @@ from lsu_mesh.mesh.config.problem import Problem
 from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
 from lsu_mesh.mesh.data_files.settings import DataFileSettings
 from lsu_mesh.mesh.grid import Grid
+from lsu_mesh.mesh.ros2.settings import Ros2Network, Ros2Topic
 from lsu_mesh.model import ContinuousModel, LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
 
@@ -119,9 +120,10 @@ class SensorSettings:
     """Simulated: the moment of a measurement lies up to so much after its turn."""
     clock_error_ns: int = 0
     """Simulated: its stamps are wrong by up to so much."""
-
     live: Literal["", "external", "ros2"] = ""
     """The kind of program that sends its measurements; empty: the mesh simulates or plays them."""
+    ros2: Ros2Topic | None = None
+    """The topic that it listens to, of a sensor whose ``live`` is "ros2"."""
 
     @property
     def source(self) -> Source:
@@ -234,6 +236,8 @@ class NetworkSettings:
     connect: tuple[str, ...] = ()
     cache: int | None = None
     tls: TlsSettings = field(default_factory=TlsSettings)
+    ros2: Ros2Network = field(default_factory=Ros2Network)
+    """Another network, of which sensors with ``source = "ros2"`` are a part too."""
 
 
 @dataclass(frozen=True)

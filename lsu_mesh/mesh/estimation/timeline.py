@@ -124,6 +124,18 @@ class Timeline:
             return False
         return self._newest_input - k > self._input_lost or len(self._steps) > self._max_steps
 
+    def last_lost_input(self, k: int) -> int:
+        """The last step, from k on, whose input is lost, as that of step k is: of its hole, or of a later one.
+
+        A hole is a run of steps without input that ends before one that has it; whoever starts again goes behind all
+        of them in one jump.
+        """
+        last = k
+        for j in range(k + 1, self._newest_input):
+            if not self.has_input(j) and (last == j - 1 or self.input_is_lost(j)):
+                last = j
+        return last
+
     # -- moving
 
     def begin(self, k: int) -> None:

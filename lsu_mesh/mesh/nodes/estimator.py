@@ -172,7 +172,7 @@ class Estimator(StartingNode):
                 messages += self._close(k, step, now)
             if not self._predict(k, step, now):
                 if self.timeline.input_is_lost(k):
-                    self._start_over(k, f"the input of step {k} is lost", now)
+                    self._start_over_behind_lost_inputs(k, now)
                 break
             messages += self._take_remarks()
             if step.published is not None and not self.held.unsound and not self.timeline.is_behind():
@@ -182,6 +182,11 @@ class Estimator(StartingNode):
             if self._has_more:
                 break
         return messages + self._take_remarks()
+
+    def _start_over_behind_lost_inputs(self, k: int, now: int) -> None:
+        last = self.timeline.last_lost_input(k)
+        words = f"the input of step {k} is lost" if last == k else f"the inputs of steps {k} to {last} are lost"
+        self._start_over(last, words, now)
 
     def _steps_at_once(self) -> int:
         """A backlog stays bounded whatever comes: what is too much waits in the queue in front of the node."""

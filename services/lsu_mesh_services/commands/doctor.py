@@ -20,7 +20,7 @@ from typing import Literal, NamedTuple
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
-from lsu_mesh_services.extras import EXTRAS, MESH, RECORD, Extra
+from lsu_mesh_services.extras import EXTRAS, GATEWAY, MCAP, MESH, RECORD, ROS2, Extra
 from lsu_mesh_services.network.security import missing_files
 
 Level = Literal["ok", "warn", "fail"]
@@ -30,6 +30,9 @@ CONSTRAINTS = Path(__file__).resolve().parents[3] / "constraints.txt"
 WITHOUT: dict[str, tuple[Level, str]] = {
     MESH.name: ("fail", "no peer can start here"),
     RECORD.name: ("warn", "a run is not recorded, recordings cannot be read"),
+    ROS2.name: ("warn", "no sensor can listen to ROS 2, bags cannot be imported"),
+    GATEWAY.name: ("warn", "no page, and no HTTP for browsers and curl"),
+    MCAP.name: ("warn", "recordings cannot be exported as MCAP"),
 }
 """What a missing extra means."""
 ENOUGH_FILES, MIN_FILES = 1024, 256

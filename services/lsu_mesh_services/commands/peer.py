@@ -14,7 +14,8 @@ from lsu_mesh.mesh.config.problem import nearest
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh.mesh.nodes.schedule import GridSchedule, Schedule
 from lsu_mesh_services.configuration import load_or_explain
-from lsu_mesh_services.exit_codes import USAGE
+from lsu_mesh_services.exit_codes import COULD_NOT_START, USAGE
+from lsu_mesh_services.extras import ROS2
 from lsu_mesh_services.session import session_settings, with_session
 
 
@@ -40,7 +41,12 @@ def main(options: argparse.Namespace) -> int:
         text = "[mesh] is live, and its steps are due at start_time + k dt; leave out --start-at, or give start_time"
         print(f"{configuration.path}: {text}", file=sys.stderr)
         return USAGE
-    return with_session(f"{options.role} {options.name}", lambda: _run(configuration, options))
+    who = f"{options.role} {options.name}"
+    is_ros2 = options.role == "sensor" and configuration.sensors[options.name].ros2 is not None
+    if is_ros2 and (missing := ROS2.missing()):
+        print(f"{who} listens to ROS 2, and {', '.join(missing)} is not installed: {ROS2.remedy}", file=sys.stderr)
+        return COULD_NOT_START
+    return with_session(who, lambda: _run(configuration, options))
 
 
 def _run(configuration: Configuration, options: argparse.Namespace) -> int:
@@ -58,7 +64,12 @@ def _run(configuration: Configuration, options: argparse.Namespace) -> int:
             print(error, file=sys.stderr)
             return None
 
-    return run_peer(configuration, (options.role, options.name), make, settings=settings, stop=options.stop)
+    who, beside = (options.role, options.name), None
+    if options.role == "sensor" and configuration.sensors[options.name].ros2 is not None:
+        from lsu_mesh_services.ros2.listener import beside_mesh
+
+        beside = beside_mesh(configuration, options)
+    return run_peer(configuration, who, make, settings=settings, stop=options.stop, beside=beside)
 
 
 def _schedule(configuration: Configuration, options: argparse.Namespace) -> Schedule | GridSchedule:
@@ -92,6 +103,10 @@ def make_node(configuration: Configuration, options: argparse.Namespace) -> Node
             from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 
             return FileSensorNode(configuration, name, boot, schedule)
+        if configuration.sensors[name].ros2 is not None:
+            from lsu_mesh.mesh.nodes.ros2_sensor import Ros2SensorNode
+
+            return Ros2SensorNode(configuration, name, boot)
         from lsu_mesh.mesh.nodes.sensor import SimulatedSensorNode
 
         return SimulatedSensorNode(configuration, name, boot)

@@ -5,9 +5,13 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lsu_mesh_services.commands.replay import read_or_explain
 from lsu_mesh_services.exit_codes import FAILURE, OK, USAGE
+
+if TYPE_CHECKING:
+    from lsu_mesh_services.recording.read import Recording
 
 
 def main(options: argparse.Namespace) -> int:
@@ -68,19 +72,27 @@ def _write_repaired(files: list[Path], target: Path, options: argparse.Namespace
 
 
 def _export(options: argparse.Namespace) -> int:
-    from lsu_mesh_services.recording.export import export
-
     file = Path(options.file)
     recording = read_or_explain(file)
     if recording is None:
         return USAGE
-    folder = file.with_suffix("") if options.out is None else Path(options.out)
+    target = file.with_suffix(".mcap" if options.format == "mcap" else "") if options.out is None else Path(options.out)
     try:
-        written = export(recording, folder, options.format)
+        written = _exported(recording, target, options.format)
     except OSError as error:
-        text = error.strerror or str(error)
-        print(f"{error.filename or folder}: cannot be written: {text}; choose a folder with -o", file=sys.stderr)
+        text, what = error.strerror or str(error), "file" if options.format == "mcap" else "folder"
+        print(f"{error.filename or target}: cannot be written: {text}; choose a {what} with -o", file=sys.stderr)
         return FAILURE
     for path in written:
         print(path)
     return OK
+
+
+def _exported(recording: Recording, target: Path, form: str) -> list[Path]:
+    if form == "mcap":
+        from lsu_mesh_services.recording.mcap_file import write_mcap
+
+        return [write_mcap(recording, target)]
+    from lsu_mesh_services.recording.export import export
+
+    return export(recording, target, form)

@@ -11,12 +11,13 @@ MAX_MESSAGES, MAX_BYTES = 65536, 2**26
 
 
 class Arrival(NamedTuple):
-    """Something that came: a ``sample``, or a peer that is ``alive`` or ``gone``."""
+    """Something that came: a ``sample``, or a peer that is ``alive`` or ``gone``; of another network, other words."""
 
     what: str
     key: str
     payload: bytes
     arrival_ns: int
+    attachment: bytes = b""
 
 
 class ReceiveQueue:
@@ -34,7 +35,7 @@ class ReceiveQueue:
         """Queue what came, or drop it where the queue is full."""
         with self._lock:
             is_full = self._queue.qsize() >= self._most or self._bytes >= self._most_bytes
-            if is_full and arrival.what == "sample":
+            if is_full and arrival.payload:  # who comes and goes has none
                 self.dropped += 1
                 return
             self._bytes += len(arrival.payload)

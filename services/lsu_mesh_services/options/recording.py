@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lsu_mesh_services.extras import RECORD
+from lsu_mesh_services.extras import MCAP, RECORD, Extra
 from lsu_mesh_services.options.parsing import EXIT_CODES, Commands, new_command
 
 
@@ -21,11 +21,22 @@ def add(commands: Commands) -> None:
     merge = _new(inner, "merge", "join the parts that a restarted recorder wrote into one recording")
     merge.add_argument("files", metavar="FILE.rrd", nargs="+", help="parts; of one file its later parts are found")
     _add_output(merge, "FILE.merged.rrd")
-    export = _new(inner, "export", "tables for other programs, and measurements as files that sensors play")
+    words = "tables for other programs and measurements as files that sensors play, or all messages as MCAP"
+    export = _new(inner, "export", words)
     export.add_argument("file", metavar="FILE.rrd", help="recording; its parts are found beside it")
-    export.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the tables (default: csv)")
-    export.add_argument("-o", "--out", metavar="DIR", help="a new or empty folder (default: FILE without .rrd)")
-    parser.set_defaults(handler="lsu_mesh_services.commands.recording", extra=RECORD)
+    export.add_argument(
+        "--format", choices=("csv", "parquet", "mcap"), default="csv",
+        help="csv or parquet: tables in a folder; mcap: one file for Foxglove and others (default: csv)",
+    )  # fmt: skip
+    export.add_argument(
+        "-o", "--out", metavar="OUT",
+        help="a new or empty folder (default: FILE without .rrd), or the new MCAP file (default: FILE.mcap)",
+    )  # fmt: skip
+    parser.set_defaults(handler="lsu_mesh_services.commands.recording", extra=_extra)
+
+
+def _extra(options: argparse.Namespace) -> Extra:
+    return MCAP if getattr(options, "format", None) == "mcap" else RECORD
 
 
 def _new(inner: Commands, name: str, words: str) -> argparse.ArgumentParser:

@@ -1,7 +1,7 @@
 """Tables of a recording for other programs, and its measurements as files that sensors play.
 
-A folder gets ``estimates`` (every posterior and fused set: bounds, point, errors), ``truth`` and ``inputs`` where they
-were recorded, one CSV file per sensor, and ``mesh.toml``, which runs the mesh on these files.
+A folder gets ``estimates`` (every posterior and fused set: bounds, point, errors), and where they were recorded
+``smoothed``, ``truth`` and ``inputs``; one CSV file per sensor, and ``mesh.toml``, which runs the mesh on these files.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.config.write import to_toml
 from lsu_mesh.mesh.data_files.spans import seconds_text
-from lsu_mesh.mesh.messages import Input, Measurement, Posterior, Truth
+from lsu_mesh.mesh.messages import Input, Measurement, Posterior, Smoothed, Truth
 from lsu_mesh_services.recording.entity_paths import outputs_of, told_apart
 from lsu_mesh_services.recording.read import Received, Recording
 
@@ -42,15 +42,18 @@ def export(recording: Recording, folder: Path, form: str) -> list[Path]:
 
 
 def tables(recording: Recording) -> dict[str, list[Row]]:
-    """``estimates`` and ``truth`` as rows."""
+    """``estimates``, ``smoothed`` and ``truth`` as rows."""
     configuration = recording.configuration
     states = told_apart(configuration.base_model.states)
     truth = {m.step: m.x for m in (one.message for one in recording.received) if isinstance(m, Truth)}
     posteriors = [one for one in recording.received if isinstance(one.message, Posterior)]
     newest = {(one.message.src, one.message.step): one.message.reference for one in posteriors}
     estimates = [_estimate(one, configuration, states, truth=truth, newest=newest) for one in posteriors]
+    smoothed = [one for one in recording.received if isinstance(one.message, Smoothed)]
+    latest = {(one.message.src, one.message.step): one.message.reference for one in smoothed}
+    sets = [_smoothed(one, configuration, states, truth=truth, newest=latest) for one in smoothed]
     listed = [{"step": k, "time": k * configuration.mesh.dt, **dict(zip(states, truth[k], strict=True))} for k in truth]
-    return {"estimates": estimates, "truth": listed}
+    return {"estimates": estimates, "smoothed": sets, "truth": listed}
 
 
 def _estimate(
@@ -81,6 +84,34 @@ def _estimate(
             f"{state}.upper": message.upper[i],
             f"{state}.truth": None if x is None else x[i],
             f"{state}.error": None if x is None else message.point[i] - x[i],
+        }
+    return row
+
+
+def _smoothed(
+    one: Received, configuration: Configuration, states: Sequence[str], truth: dict[int, list[float]], newest: Any
+) -> Row:
+    """Of the state ``step``, given all data up to step ``step + lag``."""
+    message = one.message
+    assert isinstance(message, Smoothed)
+    row: Row = {
+        "peer": message.name,
+        "step": message.step,
+        "time": message.step * configuration.mesh.dt,
+        "time_ns": configuration.grid.time_of(message.step),
+        "lag": message.lag,
+        "arrival_ns": one.arrival_ns,
+        "revision": message.revision,
+        "is_newest": newest[message.src, message.step] == message.reference,
+        "epoch": message.epoch,
+        "guarantee": message.guarantee,
+    }
+    x = truth.get(message.step)
+    for i, state in enumerate(states):
+        row |= {
+            f"{state}.lower": message.lower[i],
+            f"{state}.upper": message.upper[i],
+            f"{state}.truth": None if x is None else x[i],
         }
     return row
 

@@ -11,10 +11,12 @@ import pytest
 
 from lsu_mesh.mesh.config import load, load_with_keys
 from lsu_mesh.mesh.config.data_file_keys import KEYS
+from lsu_mesh.mesh.config.ros2 import KEYS as ROS2_KEYS
 
 OPTION = re.compile(r"^# (\w+ = .*)$", re.MULTILINE)
 EXCLUSIVE = {"sensors.s3.step", "sensors.s3.time", "sensors.s3.file", "sensors.s3.columns", "plant.file",
              "plant.columns", "plant.step", "plant.time", "filters.window.E",
+             *(f"sensors.s1.{key}" for key in ROS2_KEYS),
              *(f"{table}.{key}" for table in ("sensors.s3", "plant") for key in KEYS)}  # fmt: skip
 """Options that stand beside another one in the example, so that both cannot be on."""
 
@@ -68,7 +70,7 @@ def test_every_option_of_the_schema_is_in_the_example_and_none_besides(example: 
         "model.prior",
         "model.domain",
     }
-    assert shown - known - tables - groups - {"model.input_box", "network.tls"} == set()
+    assert shown - known - tables - groups - {"model.input_box", "network.tls", "network.ros2"} == set()
 
 
 def test_the_commented_values_are_valid(example: Path, tmp_path: Path) -> None:
@@ -101,6 +103,8 @@ def test_the_commented_values_are_the_defaults(example: Path, tmp_path: Path) ->
             "transfer_from",
             "noise_map",
             "adopt",
+            "publish",
+            *ROS2_KEYS,
             *KEYS,
         )
         lines.append(option[1] if option and not option[1].startswith(skipped) else line)

@@ -57,6 +57,9 @@ TAKEN: dict[str, set[str]] = {
     "network.listen": {"empty list"}, "network.connect": {"empty list"}, "network.cache": WHOLE,
     "network.tls.enabled": FLAG, "network.tls.authority": TEXT, "network.tls.certificate": TEXT,
     "network.tls.key": TEXT, "network.tls.access_control": FLAG, "network.tls.verify_hosts": FLAG,
+    "network.ros2.connect": {"empty list"}, "network.ros2.listen": {"empty list"},
+    "network.ros2.domain_id": {"whole", "zero"}, "network.ros2.publish": {"empty list"},
+    "network.ros2.publish[0].frame_id": TEXT, "network.ros2.publish[0].diagnostics": FLAG,
     "supervisor.restart": FLAG, "supervisor.limit": {"whole", "zero"},
 }  # fmt: skip
 """What each key takes of ``VALUES``; a key that is not here takes none of them."""
@@ -68,7 +71,7 @@ SAID_ELSEWHERE = {
 TABLES = (
     "mesh", "model", "model.prior", "model.domain", "model.input_box", "plant", "sensors", "sensors.s1", "filters",
     "filters.box", "fusion", "fusion.main", "identifier", "identifier.bounds", "recorder", "network", "network.tls",
-    "supervisor",
+    "network.ros2", "supervisor",
 )  # fmt: skip
 
 
@@ -87,6 +90,8 @@ def with_value(path: str, value: object) -> dict[str, Any]:
     values: dict[str, Any] = copy.deepcopy(tomllib.loads(EXAMPLE.read_text()))
     if path.startswith("model.schedule["):
         values["model"]["schedule"] = [{"from": 400, "rho": [0.1, 0.1, 0.1]}]
+    if path.startswith("network.ros2.publish["):
+        values["network"]["ros2"] = {"publish": [{"estimator": "box", "topic": "/box", "states": ["x1"]}]}
     *outer, last = re.findall(r"\w+", path)
     table: Any = values
     for part in outer:

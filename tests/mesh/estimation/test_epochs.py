@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from lsu_mesh.mesh.estimation.epochs import Epochs
 from lsu_mesh.mesh.keys import key
-from lsu_mesh.mesh.messages import OrthotopeMessage, Prediction, encode
+from lsu_mesh.mesh.messages import Input, OrthotopeMessage, Prediction, encode
 from lsu_mesh.mesh.nodes import plant
 from lsu_mesh.mesh.verification import verify
 
@@ -212,6 +213,31 @@ def test_an_input_that_is_lost_for_good_is_given_up_where_there_is_a_domain(
         assert any(e.name == name for e in mesh.events("started-over"))
         assert max(mesh.newest(name)) == 600, name
         assert tail(mesh, name) == {"ok"}
+        for p in mesh.posteriors(name):
+            if p.step in truth:
+                assert all(low <= x <= high for low, x, high in zip(p.lower, truth[p.step], p.upper, strict=True))
+
+
+@pytest.mark.parametrize("away", [6.5, 1.0], ids=["longer than its publisher keeps", "short"])
+def test_a_hole_of_inputs_is_crossed_in_one_jump(
+    four: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, away: float
+) -> None:
+    """325 or 50 lost inputs: one event, and current a second after it is known that they are lost."""
+    monkeypatch.setattr(plant, "PAST_SECONDS", 0.0)
+    monkeypatch.setattr(plant, "LEAST_PAST", 0)
+    mesh = four("mesh.steps=1000", DOMAIN)
+    mesh.run(0.5)
+    mesh.kill("plant")
+    mesh.run(away)
+    mesh.start("plant", "plant")
+    known = 0.0 if away > 6.0 else 6.0 - away  # 300 later inputs have come
+    mesh.run(known + 1.0)
+    newest = max(m.step for m in mesh.of(Input))
+    truth = mesh.truth()
+    for name in mesh.estimators():
+        (event,) = [e for e in mesh.events("started-over") if e.name == name]
+        assert re.match(r"the inputs of steps \d+ to \d+ are lost", event.text)
+        assert max(mesh.newest(name)) >= newest - 2, name
         for p in mesh.posteriors(name):
             if p.step in truth:
                 assert all(low <= x <= high for low, x, high in zip(p.lower, truth[p.step], p.upper, strict=True))

@@ -105,6 +105,7 @@ def test_a_sensor_stamps_by_its_own_clock_and_measures_what_is(mesh: Path) -> No
 
 
 @pytest.mark.soak
+@pytest.mark.timeout(7200)
 def test_a_thousand_faults_of_external_sensors(mesh: Path) -> None:
     """Kills, restarts and clock steps; copies and reorderings are counted besides."""
     faults = copies = 0

@@ -18,7 +18,7 @@ from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh, written
 from recorded_mesh import record
 
 from lsu_mesh.mesh.config import load
-from lsu_mesh.mesh.messages import Measurement
+from lsu_mesh.mesh.messages import Measurement, Smoothed
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +92,27 @@ def test_export_gives_tables_with_every_bit(recording: Path, mesh: LocalMesh, tm
     assert [float(row[f"x{i}.lower"]) for i in (1, 2, 3)] == sent.lower
     assert [float(row[f"x{i}.upper"]) for i in (1, 2, 3)] == sent.upper
     assert float(row["x2.error"]) == sent.point[1] - x[1]
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_export_gives_smoothed_sets_where_there_are_some(demo: Path, tmp_path: Path, form: str) -> None:
+    mesh = LocalMesh(load(demo, ["mesh.steps=20", "filters.cz.lag=4"]))
+    mesh.run(0.6)
+    recording = record(mesh, tmp_path / "demo.rrd")
+    assert main(["recording", "export", str(recording), "--format", form]) == OK
+    file = tmp_path / "demo" / f"smoothed.{form}"
+    rows = list(csv.DictReader(file.read_text().splitlines())) if form == "csv" else pq.read_table(file).to_pylist()
+    sent = [message for message in mesh.of(Smoothed, "cz") if isinstance(message, Smoothed)]
+    assert [(row["peer"], int(row["step"]), int(row["lag"])) for row in rows] == [("cz", m.step, 4) for m in sent]
+    for row, message in zip(rows, sent, strict=True):
+        assert [float(row[f"x{i}.lower"]) for i in (1, 2, 3)] == message.lower
+        assert [float(row[f"x{i}.upper"]) for i in (1, 2, 3)] == message.upper
+        assert float(row["x1.truth"]) == mesh.truth()[message.step][0]
+
+
+def test_export_of_a_mesh_that_smooths_nothing_has_no_such_table(recording: Path, tmp_path: Path) -> None:
+    assert main(["recording", "export", str(recording), "-o", str(tmp_path / "out")]) == OK
+    assert not (tmp_path / "out" / "smoothed.csv").exists()
 
 
 def test_a_file_sensor_plays_what_was_exported(recording: Path, mesh: LocalMesh, tmp_path: Path) -> None:

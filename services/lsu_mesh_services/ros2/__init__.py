@@ -1,0 +1,1 @@
+"""A second session, with a network of ROS 2."""
