@@ -172,9 +172,9 @@ class UselessData:
         return f"{begin} {by} too {direction} and not used; {self._remedy(kind, row.reason, direction)}"
 
     def _remedy(self, kind: str, reason: str, direction: str) -> str:
-        clock = "set the clock of its host, or start it with the start of the mesh"
         if reason in ("past", "future"):
-            return f"{clock}, or raise [mesh] {reason}"
+            return f"set the clock of its host or of this one, or raise [mesh] {reason}"
+        clock = "set the clock of its host, or start it with the start of the mesh"
         if direction == EARLY:
             return f"{clock}: steps count from 1 at that start"
         name, steps = self._history

@@ -12,13 +12,14 @@ import pytest
 
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.keys import key
-from lsu_mesh.mesh.messages import Event, Health, Measurement, Posterior, Refused, encode
+from lsu_mesh.mesh.messages import Event, Health, Measurement, Message, Posterior, Refused, encode
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.useless_data import USED_AGAIN, USELESS, UselessData
 
 S = 10**9
 MakeMesh = Callable[..., Any]
 RATE = 50
+START = 1_764_468_000 * S
 
 
 def at(seconds: float) -> int:
@@ -119,6 +120,27 @@ def test_a_filter_whose_sets_are_late_is_told_to_the_fusion_with_its_own_option(
     (text,) = useless.complaints(at(101.2))
     assert text.startswith("filter box: all sets of the last")
     assert text.endswith("raise history (now 32 steps, 3.2 s)")
+
+
+OWN = """
+[mesh]
+name = "own"
+dt = 0.1
+[model]
+A = [[1.0]]
+noise_map = [[1.0]]
+rho = [2.0]
+[model.prior]
+lower = [-10.0]
+upper = [10.0]
+[sensors.gauge]
+source = "external"
+C = [[1.0]]
+r = [0.5]
+[filters.box]
+kind = "LSUO"
+sensors = ["gauge"]
+"""
 
 
 # -- in whole meshes: what used to be silent
@@ -226,3 +248,44 @@ def configuration_of_one(demo: Path) -> Configuration:
     configuration = load(demo, ["mesh.rate=10", "mesh.steps=100000", "model.input_box={lower=[-5], upper=[5]}"])
     box = replace(configuration.filters["box"], sensors=("s1",), deadline=0.0)
     return replace(configuration, filters={**configuration.filters, "box": box})
+
+
+@pytest.mark.parametrize(("hours", "side", "option"), [(1, "early", "future"), (-1, "late", "past")])
+def test_an_external_sensor_whose_clock_is_wrong_by_an_hour_is_named_and_heals(
+    own: Configuration, hours: int, side: str, option: str
+) -> None:
+    node = FilterNode(own, "box", "f" * 16)
+    address, digest = key("own", "measurement", "gauge"), own.digest()
+    told: list[Message] = []
+
+    def send(seq: int, now: int, wrong_ns: int = 0) -> None:
+        message = Measurement(
+            v=1, src="sensor/gauge", boot="a" * 16, seq=seq, step=0, sent_ns=now + wrong_ns, origin_ns=now + wrong_ns,
+            model=digest, y=[0.0], time_ns=now + wrong_ns,
+            time_error_ns=0,
+        )  # fmt: skip
+        told.extend([*node.deliver(address, encode(message), now), *node.tick(now)])
+
+    for k in range(1, 31):
+        send(k, START + k * S // 10)
+    told.clear()
+    for k in range(31, 51):
+        send(k, START + k * S // 10, hours * 3600 * S)
+    (event,) = [one for one in told if isinstance(one, Event) and one.code == USELESS]
+    assert event.sent_ns <= START + (31 + 20) * S // 10
+    (text,) = [one for one in node.health(START + 5 * S).reasons if one.startswith("sensor gauge: ")]
+    assert f"3,600 s too {side} and not used; set the clock of its host" in text
+    assert text.endswith(f"or raise [mesh] {option}")
+    assert node.health(START + 5 * S).counters[f"not used.gauge.{option}"] == 20
+    told.clear()
+    send(51, START + 51 * S // 10)
+    send(52, START + 52 * S // 10)
+    assert [one for one in told if isinstance(one, Event) and one.code == USED_AGAIN]
+    assert [one for one in told if isinstance(one, Posterior) and "gauge" not in one.missing]
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Configuration:
+    """A mesh with one sensor of one's own, that has started."""
+    (tmp_path / "mesh.toml").write_text(OWN)
+    return load(tmp_path / "mesh.toml").started(START)
