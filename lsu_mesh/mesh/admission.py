@@ -123,7 +123,7 @@ class Admission:
         self.received = 0
         self.duplicates = 0
         self.refused: Counter[str] = Counter()
-        self.last_refusal = ""
+        self.last_refusal = self.last_reason = ""
         self.with_unknown_fields = 0
         """Messages let in without fields that are unknown here."""
         self.unknown_fields: Counter[str] = Counter()
@@ -188,7 +188,7 @@ class Admission:
 
     def _refuse(self, key: str, refusal: Refused, now: int | None) -> None:
         self.refused[refusal.reason] += 1
-        self.last_refusal = f"{key}: {refusal.reason}: {refusal}"[:300]
+        self.last_refusal, self.last_reason = f"{key}: {refusal.reason}: {refusal}"[:300], refusal.reason
         if refusal.seconds is not None and now is not None and self.datum_refused is not None:
             self.datum_refused(refusal, now)
 

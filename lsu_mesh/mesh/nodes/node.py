@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from lsu_mesh.mesh.admission import Admission
+from lsu_mesh.mesh.admission import DUPLICATE_PUBLISHER, Admission
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS, DuplicateProcess
 from lsu_mesh.mesh.duplicate_publishers import DuplicatePublisher, DuplicatePublishers
@@ -234,11 +234,14 @@ class Node(ABC):
             level = "ERROR" if waited > LONG_NS else "WARN"
             found.append(Complaint(level, f"waiting for {self.waiting_for()} for {waited / SECOND:.1f} s"))
         refused, dropped = self.admission.refused.total(), self.gauges.get("dropped", 0.0)
+        pairs = self._publishers.present(now)
         if self._refused.is_recent(refused, now):
-            found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {self.admission.last_refusal}"))
+            is_named = bool(pairs) and self.admission.last_reason == DUPLICATE_PUBLISHER  # in full, below
+            last = self.admission.last_reason if is_named else self.admission.last_refusal
+            found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {last}"))
         if self._dropped.is_recent(dropped, now):
             found.append(Complaint("WARN", f"{dropped:g} message(s) so far found the queue full and were dropped"))
-        found += [Complaint("WARN", pair.words) for pair in self._publishers.present(now)]
+        found += [Complaint("WARN", pair.words) for pair in pairs]
         if (twice := self._other_process.complaint(now)) is not None:
             found.append(Complaint("WARN", twice))
         queued_s = self.gauges.get("queue_ms", 0.0) * 1e-3
