@@ -77,7 +77,7 @@ def moment(time: Time) -> tuple[int, int]:
     exact, unknown = _exact_ns(time)
     ns = round(exact)
     if not 0 <= ns < MAX_NS:
-        raise WrongValue(f"time {time!r} is not within 1970 … 2262: time is in seconds; give nanoseconds as time_ns=")
+        raise WrongValue(f"time {time!r} is not within 1970 … 2262: time is in seconds; give nanoseconds as time_ns")
     return ns, math.ceil(abs(exact - ns) + unknown)
 
 

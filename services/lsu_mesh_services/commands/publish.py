@@ -23,12 +23,34 @@ STAY_S = 1.0
 """A program that prints one line and ends stays so long, so that every filter gets it."""
 
 
+TOLD = 10
+"""So many wrong lines are told each; of later ones one a second, with the number of those between."""
+
+
 class Line(NamedTuple):
     """A line, and when it came."""
 
     number: int
     text: str
     time_ns: int
+
+
+class WrongLines:
+    """Tells of wrong lines: a program that prints nothing else must not hide all that is said besides."""
+
+    def __init__(self) -> None:
+        self.count = self._untold = 0
+        self._told_at = 0.0
+
+    def tell(self, line: Line, error: WrongValue) -> None:
+        """One more."""
+        self.count += 1
+        if self.count > TOLD and time.monotonic() < self._told_at + 1.0:
+            self._untold += 1
+            return
+        before = f" ({self._untold} wrong line(s) before it are not shown)" if self._untold else ""
+        print(f"publish: line {line.number}: {error}{before}", file=sys.stderr)
+        self._untold, self._told_at = 0, time.monotonic()
 
 
 def main(options: argparse.Namespace) -> int:
@@ -89,7 +111,7 @@ def _read(lines: Stream[Line]) -> None:
 
 
 def _publish(mesh: Mesh, lines: Stream[Line], options: argparse.Namespace) -> int:
-    wrong = sent = 0
+    wrong, sent = WrongLines(), 0
     is_plant = options.plant or options.name == mesh.model().plant
     source = mesh.plant(options.name) if is_plant else mesh.sensor(options.name)
     print(f"publish: {source.role} {options.name} is on the mesh {mesh.name!r}", file=sys.stderr)
@@ -105,15 +127,14 @@ def _publish(mesh: Mesh, lines: Stream[Line], options: argparse.Namespace) -> in
                     _send(source, reading, line)
                     sent += 1
             except WrongValue as error:
-                wrong += 1
-                print(f"publish: line {line.number}: {error}", file=sys.stderr)
+                wrong.tell(line, error)
         time.sleep(max(0.0, began + STAY_S - time.monotonic()) if sent else 0.0)
     except KeyboardInterrupt:
         pass  # the usual way to end it
     if dropped := dropped + lines.dropped:
         print(f"publish: {dropped} line(s) came long before the mesh, and were dropped", file=sys.stderr)
-    print(f"publish: {sent} sent" + (f", {wrong} line(s) not: see above" if wrong else ""), file=sys.stderr)
-    return FAILURE if wrong or dropped else OK
+    print(f"publish: {sent} sent" + (f", {wrong.count} line(s) not: see above" if wrong.count else ""), file=sys.stderr)
+    return FAILURE if wrong.count or dropped else OK
 
 
 def _send(source: Source, reading: Reading, line: Line) -> None:
