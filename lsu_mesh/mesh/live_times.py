@@ -10,7 +10,7 @@ seconds later; so nobody takes live data from caches, and a process that stood s
 from __future__ import annotations
 
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import Input, Measurement, Refused
+from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused
 
 SECOND = 1_000_000_000
 
@@ -58,3 +58,14 @@ def check_live_time(
             f"{mesh.past_ns / SECOND:g} s are believed; set one of the two clocks, or [mesh] past where data come late"
         )
         raise Refused("past", text, source=message.name, seconds=-ahead / SECOND)
+
+
+def can_be_true(configuration: Configuration, message: Message, now: int) -> bool:
+    """Whether nobody refuses a message for its time, as :func:`check_live_time` does, where it comes at ``now``."""
+    if not isinstance(message, Measurement | Input):
+        return True
+    try:
+        check_live_time(configuration, message, now)
+    except Refused:
+        return False
+    return True

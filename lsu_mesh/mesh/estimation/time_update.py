@@ -69,7 +69,9 @@ def switched_within(model: LSUModel, u: Drive) -> tuple[Drive, LSUModel]:
     lower, upper = u.bounds()
     middle: Vector = lower + 0.5 * (upper - lower)
     half = np.nextafter(np.maximum(upper - middle, middle - lower), np.inf)
-    spread = np.abs(model.B) @ half * (1.0 + 4.0 * (model.input_count + 1) * np.finfo(np.float64).eps)
+    size, limits = np.abs(model.B), np.finfo(np.float64)
+    spread = size @ half * (1.0 + 4.0 * (model.input_count + 1) * limits.eps)
+    spread = np.where(size.any(axis=1), spread + model.input_count * limits.tiny, 0.0)  # products may underflow
     n = model.state_count
     noise_map = np.eye(n) if model.noise_map is None else model.noise_map
     wider = model.replace(noise_map=np.hstack([noise_map, np.eye(n)]), rho=np.concatenate([model.rho, spread]))

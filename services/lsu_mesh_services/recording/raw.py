@@ -16,7 +16,6 @@ import pyarrow as pa
 import rerun as rr
 
 from lsu_mesh.mesh.keys import parse
-from lsu_mesh.mesh.messages import Message
 from lsu_mesh_services.recording.entity_paths import path
 from lsu_mesh_services.recording.timeline import Moment, Timelines, wall_column
 
@@ -42,10 +41,10 @@ class RawStore:
         self._rows: defaultdict[str, _Rows] = defaultdict(_Rows)
         self._number = time.time_ns()
 
-    def add(self, key: str, payload: bytes, arrival_ns: int, message: Message | None) -> None:
-        """Keep a payload for the next flush."""
-        rows = self._rows[REFUSED if message is None else self._entity(key)]
-        rows.moments.append(Moment(0 if message is None else message.step, arrival_ns))
+    def add(self, key: str, payload: bytes, moment: Moment | None, arrival_ns: int) -> None:
+        """Keep a payload for the next flush, at its place in the run; None: it was refused and has none."""
+        rows = self._rows[REFUSED if moment is None else self._entity(key)]
+        rows.moments.append(Moment(0, arrival_ns) if moment is None else moment)
         rows.payloads.append(payload)
         rows.keys.append(key)
         rows.numbers.append(self._number)

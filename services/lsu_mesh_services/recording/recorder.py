@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.ledger import Ledger
+from lsu_mesh.mesh.live_times import can_be_true
 from lsu_mesh.mesh.messages import (
     Event,
     Health,
@@ -97,6 +98,7 @@ class Recorder:
         serve_port: int | None = None,
         continues: Path | None = None,
     ) -> None:
+        self._configuration = configuration
         self._names = names = EntityPaths(configuration)
         timelines = Timelines(configuration.mesh.dt)
         colors = palette.colors(configuration)
@@ -142,13 +144,22 @@ class Recorder:
         ]
 
     def record(self, key: str, payload: bytes, arrival_ns: int, message: Message | None) -> None:
-        """Keep a payload, and draw its message; ``None`` where the payload was refused."""
+        """Keep a payload, and draw its message; ``None`` where the payload was refused.
+
+        A datum of a live source whose time cannot be true is kept at the present step and not drawn: where a clock is
+        an hour ahead, the axis would reach to the steps of that hour.
+        """
         if self._broken:
             self._counts[self._broken] += 1
             return
-        self._raw.add(key, payload, arrival_ns, message)
-        if message is not None:
-            self._unflushed.append((key, message.boot, message.seq))
+        if message is None:
+            self._raw.add(key, payload, None, arrival_ns)
+            return
+        is_drawn = can_be_true(self._configuration, message, arrival_ns)
+        moment = Moment(message.step, arrival_ns) if is_drawn else self._now(arrival_ns)
+        self._raw.add(key, payload, moment, arrival_ns)
+        self._unflushed.append((key, message.boot, message.seq))
+        if is_drawn:
             self._guarded(f"drawing {message.topic} of {message.src}", lambda: self._draw(message, arrival_ns))
 
     def peer_changed(self, role: str, name: str, alive: bool, now_ns: int) -> None:

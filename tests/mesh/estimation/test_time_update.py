@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 from lsu_mesh.filters import LSUCZ, LSUO, LSUPB, Filter
 from lsu_mesh.mesh.config import Configuration, load
-from lsu_mesh.mesh.estimation.time_update import predict_step
+from lsu_mesh.mesh.estimation.time_update import predict_step, switched_within
+from lsu_mesh.model import LSUModel
+from lsu_mesh.supports import Orthotope
 
 MESH = """
 [mesh]
@@ -78,3 +81,22 @@ def test_a_push_that_comes_late_gains_speed_and_no_way(configuration: Configurat
 
 def test_before_the_first_input_any_of_the_box_acts(configuration: Configuration) -> None:
     assert speeds(configuration, 3.0, None, STEP_NS + 7) == pytest.approx((-0.4, 0.4))
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-160, 1e-170])
+def test_the_spread_of_a_state_is_never_rounded_down_and_none_where_nothing_drives_it(scale: float) -> None:
+    """Against exact rationals, also where products of the numbers are too small for floating point."""
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        B = np.vstack([scale * rng.normal(size=(2, 2)), np.zeros((1, 2))])
+        lower = scale * rng.normal(size=2)
+        upper = lower + scale * rng.uniform(size=2)
+        model = LSUModel(A=np.eye(3), B=B, C=np.eye(3), rho=[0.0] * 3, r=[1.0] * 3)
+        u, wider = switched_within(model, Orthotope(lower, upper))
+        assert isinstance(u, np.ndarray)
+        for i in range(3):
+            row = [Fraction(b) for b in B[i]]
+            for corner in (lower, upper):
+                reach = sum(abs(b) * abs(Fraction(c) - Fraction(m)) for b, c, m in zip(row, corner, u, strict=True))
+                assert Fraction(wider.rho[3 + i]) >= reach
+        assert wider.rho[5] == 0.0
