@@ -88,6 +88,15 @@ def test_no_python_file_grows_past_what_one_can_read(tracked: list[Path], root: 
     assert {name: lines for name, lines in long.items() if name not in MAY_BE_LONGER} == {}
 
 
+def test_limits_are_named_alike(tracked: list[Path], root: Path) -> None:
+    """``MAX_…``, as the rest of the code says."""
+    other = re.compile(r"^(?:MOST|LARGEST|LONGEST|OLDEST)_[A-Z]\w*", re.MULTILINE)
+    python = [(path, text) for path, text in texts(tracked) if path.suffix == ".py"]
+    found = [f"{path.relative_to(root)}: {name}" for path, text in python for name in other.findall(text)]
+    assert len(python) > 500
+    assert found == []
+
+
 MIRRORED = {"services": "services/lsu_mesh_services"}
 """Folders of tests that are named otherwise than what they test."""
 NO_MIRROR = {"live", "docker", "examples", "data"}

@@ -8,7 +8,7 @@ from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.kernels.runtime.compile import inlined, kernel
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, UNIT_ROUNDOFF, down, gamma, up
 
-MOST_PERIODS = 2.0**40
+MAX_PERIODS = 2.0**40
 """A set that spans more periods says nothing of y, and y nothing of it."""
 
 
@@ -60,7 +60,7 @@ def _choose_period(i: int, period: float, low: float, high: float, y: Vector, r:
     """Replace entry i of y, r by the strip of the possible multiples; returns 1 where there is none."""
     unit = 0.0 if period == math.floor(period) else 2.0 * UNIT_ROUNDOFF * period
     first, last = (low - r[i] - y[i]) / period, (high + r[i] - y[i]) / period
-    if not (abs(first) < MOST_PERIODS and abs(last) < MOST_PERIODS):
+    if not (abs(first) < MAX_PERIODS and abs(last) < MAX_PERIODS):
         y[i] = math.nan
         return 0
     # each quotient is off by its rounding, and by what the period is not known to

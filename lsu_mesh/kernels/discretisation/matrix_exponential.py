@@ -24,7 +24,7 @@ from lsu_mesh.kernels.discretisation.interval_matrices import (
 )
 from lsu_mesh.kernels.runtime.compile import inner
 
-LARGEST_NORM = 0.5
+MAX_NORM = 0.5
 """``‖X‖∞`` after scaling."""
 MAX_POWER = 24
 MAX_DOUBLINGS = 60
@@ -45,10 +45,10 @@ def exponential(
     X, X_radius, T, T_radius, S, S_radius = work[0], work[1], work[2], work[3], work[4], work[5]
     norm = row_norm(A) * t
     doublings = 0
-    while norm > LARGEST_NORM and doublings <= MAX_DOUBLINGS:
+    while norm > MAX_NORM and doublings <= MAX_DOUBLINGS:
         norm *= 0.5
         doublings += 1
-    if not norm <= LARGEST_NORM:
+    if not norm <= MAX_NORM:
         return False
     for i in range(n):
         for j in range(n):

@@ -20,9 +20,9 @@ from lsu_mesh.kernels.discretisation.matrix_exponential import exponential
 from lsu_mesh.kernels.runtime.compile import inner
 from lsu_mesh.kernels.runtime.rounding import gamma
 
-LARGEST_EXCESS = 0.0195
+MAX_EXCESS = 0.0195
 """By so much of it the hull of the zonotope and its box may exceed what is surely reached, in each coordinate."""
-LARGEST_BOX_SHARE = 0.01
+MAX_BOX_SHARE = 0.01
 NO_NOISE = 2.0**-40
 """A coordinate with less of the noise than this share of the largest one has none but rounding."""
 MAX_GROWTH = 20.0
@@ -105,7 +105,7 @@ def looseness(G: Matrix, box: Vector, reached: Vector) -> float:
             sure = reached[i] - box[i]
             if not (hull[i] > 0.0 and sure > 0.0):
                 return math.inf
-            worst = max(worst, box[i] / hull[i] / LARGEST_BOX_SHARE, ((hull[i] + box[i]) / sure - 1.0) / LARGEST_EXCESS)
+            worst = max(worst, box[i] / hull[i] / MAX_BOX_SHARE, ((hull[i] + box[i]) / sure - 1.0) / MAX_EXCESS)
     return worst
 
 

@@ -24,7 +24,7 @@ _DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*(us|ms|s|min)")
 _UNIT_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0}
 _SPAN = re.compile(r"([0-9]{1,18}(?:\.[0-9]{1,18})?)\s*(ns|us|ms|s|min)")
 _UNIT_NS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9}
-MOST_NS = 2**62
+MAX_NS = 2**62
 """146 years: longer spans are not counted in nanoseconds."""
 SMALLEST = 5e-324
 """A number larger than minus this is not negative."""
@@ -214,7 +214,7 @@ def span_ns(low: int = 0) -> Expected[int]:
             raise Unfit
         if span.denominator != 1:
             raise Unfit("it is no whole number of nanoseconds")
-        if not low <= span < MOST_NS:
+        if not low <= span < MAX_NS:
             raise Unfit
         return int(span)
 

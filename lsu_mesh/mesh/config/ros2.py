@@ -19,7 +19,7 @@ PUBLICATION_KEYS = ("estimator", "topic", "states", "frame_id", "diagnostics")
 STAMPS: tuple[Stamp, ...] = get_args(Stamp)
 DOMAINS = 232
 """The largest domain id that ROS 2 allows."""
-MOST_STATES = 3
+MAX_STATES = 3
 """A point has x, y and z."""
 
 
@@ -84,7 +84,7 @@ def _read_publication(table: Table) -> Ros2Publication:
         table.wrong("topic", f"{shown(topic)} is no topic; expected {TOPIC_RULE}", TOPIC_RULE)
     states = table.texts("states")
     states = states if isinstance(states, list) else []
-    if len(states) > MOST_STATES or (not states and "states" in table.values):
+    if len(states) > MAX_STATES or (not states and "states" in table.values):
         table.mismatch("states", "one to three states, which are x, y and z", len(states))
     frame_id = table.text("frame_id", "map")
     diagnostics = table.flag("diagnostics", True)

@@ -13,7 +13,7 @@ from lsu_mesh.mesh.nodes.node import SECOND
 
 SETTLING_NS = SECOND
 """So long after the links are back, others have asked for what they missed."""
-MOST_SETTLING_NS = 4 * SECOND
+MAX_SETTLING_NS = 4 * SECOND
 """After so long a source hurries in any case: a peer that has left does not come back. Until then it has published no
 more than it keeps, which is six seconds of steps."""
 HURRY = 5.0
@@ -23,7 +23,7 @@ HURRY = 5.0
 class RateLimit:
     """Steps that may go out: a bucket of ``kept/3`` tokens, filled at the mesh's rate, later ``HURRY`` times as fast.
 
-    Later is ``SETTLING_NS`` after there were as many links as when the bucket was full last, or ``MOST_SETTLING_NS``.
+    Later is ``SETTLING_NS`` after there were as many links as when the bucket was full last, or ``MAX_SETTLING_NS``.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class RateLimit:
 
     def _hurry_from(self) -> int:
         assert self._full_at is not None
-        latest = self._full_at + MOST_SETTLING_NS
+        latest = self._full_at + MAX_SETTLING_NS
         return latest if self._back_at is None else min(latest, self._back_at + SETTLING_NS)
 
     def _filled(self, now: int) -> float:

@@ -13,7 +13,7 @@ from lsu_mesh.mesh.ros2.decoder import Decoder, Reading, UnfitMessage, type_hash
 from lsu_mesh.mesh.ros2.dialects import dialect_of
 from lsu_mesh.mesh.ros2.listening import Listening
 
-MOST_HZ = 1000
+MAX_HZ = 1000
 """Messages per second of which late joiners can get as much of the past as of the others'."""
 
 
@@ -39,7 +39,7 @@ class Ros2SensorNode(Node):
         self._error_ns = settings.time_error_ns
         store, is_stamped = types_of(network.distro), self.topic.stamp == "header"
         self._decoder = Decoder(store, self.topic.type, self.topic.fields, stamped=is_stamped)
-        self.messages_per_step = max(1, math.ceil(CACHED_SECONDS * MOST_HZ / configuration.cached))
+        self.messages_per_step = max(1, math.ceil(CACHED_SECONDS * MAX_HZ / configuration.cached))
         self._refusals: dict[str, int] = {}
         self._last_refusal = ""
         self._told_ns: dict[str, int] = {}

@@ -17,7 +17,7 @@ from lsu_mesh.mesh.nodes.plant_course import PlantCourse
 from lsu_mesh.mesh.nodes.sensor import listed
 from lsu_mesh.simulation import measured
 
-LEAST_STEP_NS, LARGEST_STEP_NS = 10 * SECOND, 3600 * SECOND
+LEAST_STEP_NS, MAX_STEP_NS = 10 * SECOND, 3600 * SECOND
 """A clock that is set wrong by less tells false times, which only ``time_error`` can declare."""
 MAX_CLOCK_STEPS = 3
 PAUSES = (0.3, 1.0, 1.7, 6.0)
@@ -44,7 +44,7 @@ def draw_clock_steps(
         steps = []
         for _ in range(rng.randint(0, MAX_CLOCK_STEPS)):
             first = rng.randint(begin, max(begin, end - MIN_OFF_NS))
-            size = round(LEAST_STEP_NS * (LARGEST_STEP_NS / LEAST_STEP_NS) ** rng.random())
+            size = round(LEAST_STEP_NS * (MAX_STEP_NS / LEAST_STEP_NS) ** rng.random())
             last = min(end, first + rng.randint(MIN_OFF_NS, MAX_OFF_NS))
             steps.append(ClockStep(first, last, size * rng.choice((-1, 1))))
         found[name] = tuple(steps)

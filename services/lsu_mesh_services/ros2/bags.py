@@ -12,7 +12,7 @@ from lsu_mesh.mesh.ros2.decoder import Decoder, UnfitMessage, has_header
 from lsu_mesh.mesh.ros2.fields import NoSuchField, check_path, numbers_of
 
 EXPECTED = "a file .mcap or .db3, or the folder of a rosbag2"
-MOST_FIELDS = 200
+MAX_FIELDS = 200
 """Fields that are listed of a type."""
 
 
@@ -79,8 +79,8 @@ class Bag:
         return found[0]
 
     def fields(self, topic: Topic) -> list[str]:
-        """Paths to the numbers of a type, those in lists as ``[0]``, at most :data:`MOST_FIELDS`."""
-        return numbers_of(self._reader.typestore, topic.type)[:MOST_FIELDS]
+        """Paths to the numbers of a type, those in lists as ``[0]``, at most :data:`MAX_FIELDS`."""
+        return numbers_of(self._reader.typestore, topic.type)[:MAX_FIELDS]
 
     def has_header(self, topic: Topic) -> bool:
         """Whether its messages tell their time."""

@@ -12,7 +12,7 @@ from lsu_mesh.mesh.messages import Measurement, Truth
 from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.nodes.plant import PlantNode
-from lsu_mesh.mesh.nodes.rate_limit import HURRY, MOST_SETTLING_NS, SETTLING_NS, RateLimit
+from lsu_mesh.mesh.nodes.rate_limit import HURRY, MAX_SETTLING_NS, SETTLING_NS, RateLimit
 from lsu_mesh.mesh.nodes.schedule import Schedule
 
 RATE, KEPT = 50.0, 300
@@ -72,7 +72,7 @@ def test_a_peer_that_has_left_does_not_hold_a_source_up() -> None:
     pace.record_links(5, 0)
     pace.take(1, 0)
     out = published(pace, 500, 20.0, links={0.1: 4})
-    assert sum(steps for at, steps in out if at <= MOST_SETTLING_NS) <= KEPT
+    assert sum(steps for at, steps in out if at <= MAX_SETTLING_NS) <= KEPT
     assert sum(steps for _, steps in out) >= 500 + 19.0 * RATE
 
 

@@ -10,8 +10,8 @@ import pytest
 from lsu_mesh.mesh.config import load
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh.mesh.simulator.external_sensor import (
-    LARGEST_STEP_NS,
     LEAST_STEP_NS,
+    MAX_STEP_NS,
     ClockStep,
     ExternalSensor,
     draw_clock_steps,
@@ -84,7 +84,7 @@ def test_clocks_jump_by_ten_seconds_to_an_hour_and_are_set_right_in_time() -> No
         for steps in draw_clock_steps(rng, ["a", "b"], 5 * SECOND, 20 * SECOND).values():
             for step in steps:
                 assert 5 * SECOND <= step.begin <= step.end <= 20 * SECOND
-                assert LEAST_STEP_NS <= abs(step.offset_ns) <= LARGEST_STEP_NS
+                assert LEAST_STEP_NS <= abs(step.offset_ns) <= MAX_STEP_NS
 
 
 def test_a_sensor_stamps_by_its_own_clock_and_measures_what_is(mesh: Path) -> None:
