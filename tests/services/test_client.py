@@ -89,7 +89,7 @@ def test_now_is_now() -> None:
 @pytest.mark.parametrize(
     ("wrong", "remedy"),
     [
-        (1_700_000_000_000_000_000, "time_ns="), (-1, "seconds"), (float("nan"), "expected seconds"), (True, "no time"),
+        (1_700_000_000_000_000_000, "time_ns"), (-1, "seconds"), (float("nan"), "expected seconds"), (True, "no time"),
         ("soon", "2024-05-01T12:00:00Z"), ("2024-05-01T12:00:00", "Z or +02:00"), ("nan", "expected"),
         (datetime(2024, 5, 1), "time zone"), ("2024-13-01T12:00:00Z", "expected"), ([1], "expected seconds"),
         ("1_000", "expected"), ("Infinity", "expected"),
