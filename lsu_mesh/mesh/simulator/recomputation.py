@@ -64,7 +64,15 @@ class Recomputation:
 
     def check(self, node: Node, newest: dict[int, Posterior]) -> None:
         """The newest set of each step that got something late is what its data make of the set before."""
-        for k in sorted(self._late.pop(node.boot, ())):
+        if not isinstance(node, FilterNode):
+            return
+        late = self._late.pop(node.boot, set())
+        if node.current is None:  # it has left these steps, and will not do them again
+            return
+        waiting = {k for k in late if not node.timeline.is_over(k)}
+        if waiting:  # what came late sees an input that is still to come: the step is done again when that is there
+            self._late[node.boot] = waiting
+        for k in sorted(late - waiting):
             before, found = newest.get(k - 1), newest.get(k)
             if before is None or found is None or {before.boot, found.boot} != {node.boot}:
                 continue
