@@ -117,17 +117,14 @@ def next_state(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vec
     that rounding, which every filter's own outward rounding covers.
     """
     n = model.state_count
-    out = np.empty(n)
-    A = np.array(model.A)
-    B = np.zeros((n, 0)) if model.B is None else np.array(model.B)
+    A = model.A
+    B = np.zeros((n, 0)) if model.B is None else model.B
     state, drive = np.array(x, dtype=np.float64), np.array(u, dtype=np.float64).reshape(model.input_count)
     if model.a is not None:
         B, drive = np.hstack([B, model.a.reshape(n, 1)]), np.append(drive, 1.0)
     if model.noise_map is None:
-        plant_step.bounded(A, state, B, drive, unit, np.array(model.rho), out)
-    else:
-        plant_step.mapped(A, state, B, drive, np.array(model.noise_map), unit, np.array(model.rho), out)
-    return out
+        return plant_step.bounded(A, state, B, drive, unit, model.rho)
+    return plant_step.mapped(A, state, B, drive, model.noise_map, unit, model.rho)
 
 
 def flow_state(flow: ContinuousModel, x: ArrayLike, u: ArrayLike, unit: Vector, h_ns: int) -> Vector:
@@ -141,13 +138,12 @@ def flow_state(flow: ContinuousModel, x: ArrayLike, u: ArrayLike, unit: Vector, 
         return np.array(x, dtype=np.float64)
     driven = _noise_as_input(flow).discretised(h_ns)
     assert driven.B is not None
-    state, out = np.array(x, dtype=np.float64), np.empty(flow.state_count)
+    state = np.array(x, dtype=np.float64)
     drive = np.concatenate([np.array(u, dtype=np.float64).ravel(), NOISE_SHARE * flow.rates.rho * unit])
-    B = np.array(driven.B)
+    B = driven.B
     if driven.a is not None:
         B, drive = np.hstack([B, driven.a.reshape(-1, 1)]), np.append(drive, 1.0)
-    plant_step.mapped(np.array(driven.A), state, B, drive, np.zeros((state.size, 0)), np.zeros(0), np.zeros(0), out)
-    return out
+    return plant_step.mapped(driven.A, state, B, drive, np.zeros((state.size, 0)), np.zeros(0), np.zeros(0))
 
 
 @functools.lru_cache(maxsize=64)
@@ -168,12 +164,11 @@ def measured(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vecto
     if model.has_plain_outputs:
         return measure(model.C, model.r, x, unit)
     m = model.output_count
-    D = np.zeros((m, 0)) if model.D is None else np.array(model.D)
+    D = np.zeros((m, 0)) if model.D is None else model.D
     drive = np.zeros(0) if model.D is None else np.array(u, dtype=np.float64).ravel()
     if model.d is not None:
         D, drive = np.hstack([D, model.d.reshape(m, 1)]), np.append(drive, 1.0)
-    out = np.empty(m)
-    plant_step.bounded(np.array(model.C), np.array(x, dtype=np.float64), D, drive, unit, np.array(model.r), out)
+    out = plant_step.bounded(model.C, np.array(x, dtype=np.float64), D, drive, unit, model.r)
     if model.period is not None:
         turns = np.floor(np.divide(out, model.period, out=np.zeros(m), where=model.period > 0) + 0.5)
         out = out - turns * model.period
@@ -183,9 +178,8 @@ def measured(model: LSUModel, x: ArrayLike, u: ArrayLike, unit: Vector) -> Vecto
 def measure(C: ArrayLike, r: ArrayLike, x: ArrayLike, unit: Vector) -> Vector:
     """``y = C x + r · unit`` (m,), the noise shrunk so that ``|y − C x| ≤ r`` holds exactly; C (m, n), r (m,)."""
     rows, state = np.array(C, dtype=np.float64), np.array(x, dtype=np.float64)
-    out = np.empty(rows.shape[0])
-    plant_step.bounded(rows, state, np.zeros((rows.shape[0], 0)), np.zeros(0), unit, np.array(r, dtype=np.float64), out)
-    return out
+    widths = np.array(r, dtype=np.float64)
+    return plant_step.bounded(rows, state, np.zeros((rows.shape[0], 0)), np.zeros(0), unit, widths)
 
 
 @overload

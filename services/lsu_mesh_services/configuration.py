@@ -12,11 +12,16 @@ from lsu_mesh.mesh.config import Configuration, ConfigurationError, load
 DEMO = Path(__file__).resolve().parent / "demo.toml"
 
 
-def load_or_explain(file: str | None, options: argparse.Namespace) -> Configuration | None:
-    """The configuration, or None after its mistakes have been printed on stderr."""
+def load_or_explain(
+    file: str | None, options: argparse.Namespace, *, makes_filters: bool = True
+) -> Configuration | None:
+    """The configuration, or None after its mistakes have been printed on stderr.
+
+    Without ``makes_filters`` the filters' classes do not check their own options: then no kernel is loaded.
+    """
     path = DEMO if file is None else Path(file)
     try:
-        return load(path, [*flags(options), *options.overrides], os.environ)
+        return load(path, [*flags(options), *options.overrides], os.environ, makes_filters=makes_filters)
     except ConfigurationError as error:
         print_problems(error)
         return None

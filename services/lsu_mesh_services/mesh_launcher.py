@@ -13,7 +13,7 @@ from typing import Protocol
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
-from lsu_mesh_services.configuration import DEMO, flags
+from lsu_mesh_services.configuration import DEMO, flags, load_or_explain
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
 from lsu_mesh_services.mesh_start import moment_text
 from lsu_mesh_services.monitoring.run_report import RunReport
@@ -35,6 +35,8 @@ LIVE_LEAD_S = 2.0
 """So long after the launch t_0 of a mesh lies that starts now: its prior is of that moment."""
 MAX_AT_ONCE = 1024
 """Messages that are processed before the children and the stop flag are checked again, however many more wait."""
+START_ORDER = ("recorder", "plant", "sensor", "identifier", "fusion", "filter")
+"""The recorder has most to load; before the first estimator is forked the kernels are loaded."""
 QUIET_S = 4.0
 """The run is over when the sources have ended and no new message has arrived for so long."""
 
@@ -148,7 +150,7 @@ def _run_mesh(
     settings = _session_settings(configuration, options)
     with Bus(settings, clock) as bus:
         recording = None if options.no_record else _recording_path(configuration, options)
-        supervisor = Supervisor(configuration.supervisor)
+        supervisor = Supervisor(configuration.supervisor, forks=True)
         report = RunReport(configuration)
         run = Run(
             configuration=configuration,
@@ -205,6 +207,8 @@ def _supervise(run: Run) -> int:
     run.happened += complaints
     never = sorted(run.external - run.came)
     run.happened += [f"{name}, which is external, never came" for name in never]
+    if code == USAGE and load_or_explain(run.options.file, run.options) is None:
+        return USAGE
     if code != OK:
         for words in run.happened:
             print(words, file=sys.stderr)
@@ -241,10 +245,9 @@ def _announce(run: Run) -> None:
 
 def _start(run: Run) -> int:
     """Start everyone, wait until all see one another, then let the sources begin."""
-    _compile_kernels()
     names = set()
     held = []
-    for role, name in run.configuration.peers():
+    for role, name in sorted(run.configuration.peers(), key=lambda peer: START_ORDER.index(peer[0])):
         if role == "recorder" and run.recording is None:
             continue
         is_source = not run.configuration.mesh.is_live and _is_source(run.configuration, role, name)
@@ -254,8 +257,9 @@ def _start(run: Run) -> int:
         names.add(name)
         if is_source:
             held.append(child)
-    if not _await_mesh(run, names):
-        return COULD_NOT_START
+    code = _await_mesh(run, names)
+    if code != OK:
+        return code
     if run.viewer is not None:
         print(run.viewer.open(), file=sys.stderr)
     begin = run.clock.now() + int(START_LEAD_S * 1e9)
@@ -265,13 +269,6 @@ def _start(run: Run) -> int:
         run.supervisor.tell(child, str(begin))
     run.began_following = True
     return OK
-
-
-def _compile_kernels() -> None:
-    """Compile once here, so that the children only load."""
-    from lsu_mesh.filters.warm_up import warm_up
-
-    warm_up()
 
 
 def _is_source(configuration: Configuration, role: str, name: str) -> bool:
@@ -297,25 +294,30 @@ def _arguments(run: Run, role: str) -> list[str]:
     return arguments
 
 
-def _await_mesh(run: Run, names: set[str]) -> bool:
-    """Wait until every peer is there and connected to all others; False when one could not start."""
+def _await_mesh(run: Run, names: set[str]) -> int:
+    """Wait until every peer is there and connected to all others; else the exit code that says why not.
+
+    Filters check their own options; a peer that refuses its configuration would refuse it again.
+    """
     end, patience = time.monotonic() + READY_S, 0.0
     while True:
         run.turn()
         if run.stop:
             run.record("stopped before the mesh was up")
-            return False
+            return COULD_NOT_START
+        if any(child.process is not None and child.process.returncode == USAGE for child in run.supervisor.children):
+            return USAGE
         failed = [child for child in run.supervisor.children if child.given_up or child.restarts]
         if failed or time.monotonic() > end:
             run.record(f"the mesh did not come up; not there: {', '.join(sorted(names - run.alive))}")
-            return False
+            return COULD_NOT_START
         if names <= run.alive:
             if all(run.report.links.get(name, 0) >= len(names) for name in names):
-                return True
+                return OK
             patience = patience or time.monotonic() + LINKS_S
             if time.monotonic() > patience:
                 run.record(f"not all peers are connected after {LINKS_S:g} s; going on: {run.report.links}")
-                return True
+                return OK
 
 
 def _follow(run: Run) -> None:

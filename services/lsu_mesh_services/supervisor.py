@@ -13,7 +13,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from lsu_mesh.mesh.config.settings import SupervisorSettings
+from lsu_mesh_services.forking import CAN_FORK, ForkedProcess, ForkServer
 
+PROGRAM = (sys.executable, "-P", "-m", "lsu_mesh_services")
+"""``lsu-mesh``; -P: not the packages of the working folder."""
 LAST_WORDS = 12
 STOP_ORDER = ("plant", "sensor", "identifier", "filter", "fusion", "recorder")
 PATIENCE_S = {"recorder": 20.0}
@@ -27,7 +30,7 @@ class Child:
     role: str
     name: str
     arguments: Sequence[str]
-    process: subprocess.Popen[str] | None = None
+    process: subprocess.Popen[str] | ForkedProcess | None = None
     restarts: int = 0
     restart_at: float | None = None
     given_up: bool = False
@@ -48,36 +51,49 @@ class Child:
 
 
 class Supervisor:
-    """Runs children; nothing else on the machine is ever touched."""
+    """Runs children; nothing else on the machine is ever touched.
 
-    def __init__(self, settings: SupervisorSettings, environment: Mapping[str, str] | None = None) -> None:
+    With ``forks`` they are forked from a process that has loaded what they need, where the system allows that.
+    """
+
+    def __init__(
+        self, settings: SupervisorSettings, environment: Mapping[str, str] | None = None, *, forks: bool = False
+    ) -> None:
         self._settings = settings
         self._environment = {**os.environ, **(environment or {}), "LSU_MESH_PARENT": str(os.getpid())}
+        self._server = ForkServer(self._environment) if forks and CAN_FORK else None
         self.children: list[Child] = []
 
     def start(self, role: str, name: str, arguments: Sequence[str], *, held: bool = False) -> Child:
         """Start ``lsu-mesh ROLE NAME …`` in a process of its own; a held one waits for :meth:`tell`."""
-        program = [sys.executable, "-P", "-m", "lsu_mesh_services"]  # -P: not the packages of the working folder
-        child = Child(role, name, [*program, role, name, *arguments], is_held=held)
+        child = Child(role, name, [*PROGRAM, role, name, *arguments], is_held=held)
         self.children.append(child)
         self._launch(child)
         return child
 
-    def _launch(self, child: Child) -> None:
-        child.process = subprocess.Popen(
+    def _launch(self, child: Child, *, forks: bool = True) -> None:
+        environment = {"LSU_MESH_RESTARTS": str(child.restarts)}
+        if forks and self._server is not None and self._server.is_alive:
+            arguments = child.arguments[len(PROGRAM) :]
+            child.process = self._server.fork(arguments, environment, has_input=child.is_held)
+        else:
+            child.process = self._start_program(child, environment)
+        child.reader = threading.Thread(target=_read_words, args=(child.process, child.words), daemon=True)
+        child.reader.start()
+        if child.is_held and child.line:
+            self.tell(child, child.line)
+
+    def _start_program(self, child: Child, environment: Mapping[str, str]) -> subprocess.Popen[str]:
+        return subprocess.Popen(
             child.arguments,
             stdin=subprocess.PIPE if child.is_held else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            env={**self._environment, "LSU_MESH_RESTARTS": str(child.restarts)},
+            env={**self._environment, **environment},
             start_new_session=True,  # Ctrl-C at the terminal reaches the supervisor only, which stops them in order
         )
-        child.reader = threading.Thread(target=_read_words, args=(child.process, child.words), daemon=True)
-        child.reader.start()
-        if child.is_held and child.line:
-            self.tell(child, child.line)
 
     def tell(self, child: Child, line: str) -> None:
         """Write a line to a held child; when it is started again it finds the line at once."""
@@ -99,6 +115,8 @@ class Supervisor:
                     child.restarts += 1
                     self._launch(child)
                     happened.append((child, f"{child.label} was started again"))
+            elif isinstance(child.process, ForkedProcess) and child.process.was_refused():
+                self._launch(child, forks=False)
             elif child.process is not None and child.process.poll() is not None and not child.given_up:
                 happened.append((child, self._ended(child, now)))
         return happened
@@ -131,6 +149,8 @@ class Supervisor:
                 assert child.process is not None
                 child.process.kill()
                 child.process.wait()
+        if self._server is not None:
+            self._server.close()
 
 
 def _is_running(child: Child) -> bool:
@@ -153,12 +173,12 @@ def _await_end(child: Child, end: float) -> str:
 def _ending(child: Child) -> str:
     assert child.process is not None
     code = child.process.returncode
-    if code < 0:
+    if code is not None and code < 0:
         return f"killed by {signal.Signals(-code).name}"
     return f"exit code {code}"
 
 
-def _read_words(process: subprocess.Popen[str], words: deque[str]) -> None:
+def _read_words(process: subprocess.Popen[str] | ForkedProcess, words: deque[str]) -> None:
     assert process.stdout is not None
     with process.stdout:
         for line in process.stdout:

@@ -1,5 +1,8 @@
 """How kernels are compiled: numba, cached, no fast-math, no BLAS.
 
+numba is imported when the first kernel runs: importing a kernel costs nothing, and a process that calls none, such as a
+sensor, never loads it.
+
 Same bits everywhere: explicit loops in a fixed order, no contraction to fused multiply-add (LLVM contracts only when
 fast-math allows it), no library calls but ``sqrt``, ``abs``, ``log`` and ``exp``, the latter two for volumes only.
 """
@@ -11,16 +14,13 @@ import hashlib
 import importlib
 import re
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
-from numba.core import config as numba_config
-
 F = TypeVar("F", bound=Callable[..., object])
 
-config: Any = numba_config
 _FOLDER = Path(__file__).parents[1]
 _IMPORT = re.compile(r"^from lsu_mesh\.kernels(?:\.([\w.]+))? import (\([^)]*\)|.*)", re.MULTILINE)
 
@@ -34,6 +34,7 @@ _OPTIONS: dict[str, Any] = {
     "no_cfunc_wrapper": False,
 }
 _NO_WRAPPERS: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_LOADING = threading.Lock()
 
 
 def kernel(function: F) -> F:
@@ -42,20 +43,67 @@ def kernel(function: F) -> F:
     The cache lies in ``NUMBA_CACHE_DIR``, else beside the source, else in the user's cache folder. Where none of
     these can be written the kernel is compiled anew in each process, which costs seconds and nothing else.
     """
-    return _compiled(function, {}, optimisation=3)
+    return cast(F, Kernel(function, {}, optimisation=3))
 
 
 def inner(function: F) -> F:
     """As :func:`kernel`, for a function that only other kernels call: it compiles in half the time."""
-    return _compiled(function, _NO_WRAPPERS, optimisation=1)
+    return cast(F, Kernel(function, _NO_WRAPPERS, optimisation=1))
 
 
 def inlined(function: F) -> F:
-    """As :func:`kernel`, copied into each caller: for tiny functions that call nothing but such ones."""
-    return _compiled(function, {"forceinline": True}, optimisation=1)
+    """As :func:`kernel`, copied into each caller: for tiny functions that call nothing but such ones.
+
+    Python calls the function itself, without numba; the bits are the same.
+    """
+    return cast(F, Inlined(function, {"forceinline": True}, optimisation=1))
 
 
-def _compiled(function: F, options: dict[str, Any], optimisation: int) -> F:
+class Kernel:
+    """A function that is compiled, or loaded from the cache, when it is first called.
+
+    numba takes it for its :attr:`dispatcher`, other attributes are those of the dispatcher.
+    """
+
+    def __init__(self, function: Callable[..., object], options: dict[str, Any], optimisation: int) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._options, self._optimisation = options, optimisation
+        self._dispatcher: Any = None
+
+    def __call__(self, *arguments: object) -> object:
+        return (self._dispatcher or self.dispatcher)(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.dispatcher, name)
+
+    @property
+    def dispatcher(self) -> Any:
+        """What numba compiles the function with; imports numba when it is first asked for."""
+        with _LOADING:
+            if self._dispatcher is None:
+                self._dispatcher = _compiled(self.py_func, self._options, self._optimisation)
+        return self._dispatcher
+
+    @property
+    def _numba_type_(self) -> Any:
+        """The type of the function where another kernel calls it."""
+        return self.dispatcher._numba_type_
+
+
+class Inlined(Kernel):
+    """See :func:`inlined`."""
+
+    def __call__(self, *arguments: object) -> object:
+        return self.py_func(*arguments)
+
+
+def _compiled(function: Callable[..., object], options: dict[str, Any], optimisation: int) -> Any:
+    import numba
+
+    compiled: Any
     try:
         compiled = numba.njit(cache=True, **{**_OPTIONS, **options})(function)
     except RuntimeError:  # numba: "cannot cache function: no locator available"
@@ -67,7 +115,7 @@ def _compiled(function: F, options: dict[str, Any], optimisation: int) -> F:
             module = ".".join(source.relative_to(_FOLDER).with_suffix("").parts)
             compiled._cache._cache_file._source_stamp = _stamp(module)
     compiled.compile = _with_settings(compiled.compile, optimisation)
-    return cast(F, compiled)
+    return compiled
 
 
 def awaits_compilation(compiled: Callable[..., object]) -> bool:
@@ -78,6 +126,9 @@ def awaits_compilation(compiled: Callable[..., object]) -> bool:
 
 def _with_settings(compile_signature: Callable[[Any], Any], optimisation: int) -> Callable[[Any], Any]:
     """Compile for loops over a handful of entries: vectorised, they take twice as long to compile *and* to run."""
+    from numba.core import config as numba_config
+
+    config: Any = numba_config
 
     def compile_small_loops(signature: Any) -> Any:
         _load_registries_without_scipy()

@@ -8,44 +8,66 @@ has no owner: whoever borrows must keep the memory alive, which the caller of a 
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numba.core import cgutils, types
-from numba.extending import intrinsic
-from numba.np import arrayobj
 from numpy.typing import NDArray
 
 Array = TypeVar("Array", bound=NDArray[np.float64])
-_arrays: Any = arrayobj
-_builders: Any = cgutils
+
+
+class Intrinsic:
+    """A numba intrinsic that is made when the first kernel that uses it is compiled."""
+
+    def __init__(self, define: Callable[..., Any]) -> None:
+        self._define = define
+
+    @functools.cached_property
+    def _numba_type_(self) -> Any:
+        from numba.core.registry import cpu_target
+        from numba.extending import intrinsic
+
+        made: Any = intrinsic(self._define)
+        cpu_target.typing_context.refresh()
+        return cpu_target.typing_context.resolve_value_type(made)
 
 
 def _borrowed(_typing_context: Any, array: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        view = _arrays.make_array(signature.return_type)(context, builder, value=arguments[0])
+        from numba.core import cgutils
+
+        builders: Any = cgutils
+        view = _arrays().make_array(signature.return_type)(context, builder, value=arguments[0])
         for owner in ("meminfo", "parent"):
-            setattr(view, owner, _builders.get_null_value(getattr(view, owner).type))
+            setattr(view, owner, builders.get_null_value(getattr(view, owner).type))
         return view._getvalue()
 
     return array(array), codegen
 
 
 def _line(_typing_context: Any, memory: Any, start: Any, size: Any) -> Any:
+    from numba.core import types
+
     return types.Array(memory.dtype, 1, "C")(memory, types.int64, types.int64), _view
 
 
 def _block(_typing_context: Any, memory: Any, start: Any, rows: Any, columns: Any) -> Any:
+    from numba.core import types
+
     return types.Array(memory.dtype, 2, "C")(memory, types.int64, types.int64, types.int64), _view
 
 
 def _view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    from numba.core import types
+
     memory, start, *shape = arguments
-    owner = _arrays.make_array(signature.args[0])(context, builder, value=memory)
-    view = _arrays.make_array(signature.return_type)(context, builder)
+    owner = _arrays().make_array(signature.args[0])(context, builder, value=memory)
+    view = _arrays().make_array(signature.return_type)(context, builder)
     size = context.get_abi_sizeof(context.get_data_type(signature.args[0].dtype))
     itemsize = context.get_constant(types.intp, size)
-    _arrays.populate_array(
+    _arrays().populate_array(
         view,
         data=builder.gep(owner.data, [start]),
         shape=shape,
@@ -54,6 +76,12 @@ def _view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         meminfo=None,
     )
     return view._getvalue()
+
+
+def _arrays() -> Any:
+    from numba.np import arrayobj
+
+    return arrayobj
 
 
 if TYPE_CHECKING:
@@ -68,4 +96,4 @@ if TYPE_CHECKING:
         """``memory[start :]`` as a matrix (rows, columns) without an owner; for compiled code only."""
 
 else:
-    borrowed, line, block = intrinsic(_borrowed), intrinsic(_line), intrinsic(_block)
+    borrowed, line, block = Intrinsic(_borrowed), Intrinsic(_line), Intrinsic(_block)

@@ -62,7 +62,7 @@ def read_filter(
     system: System,
     peers: Mapping[str, Collection[str]],
 ) -> FilterSettings:
-    """``[filters.NAME]``; the filter is made once, so that the class checks its own options.
+    """``[filters.NAME]``; the filter is made once, so that the class checks its own options (``makes_filters``).
 
     ``peers`` holds the names of all ``filters`` and ``fusion`` tables.
     """
@@ -176,12 +176,14 @@ def _read_senders(
 def _read_options(
     table: Table, kind: Kind, sensors: Mapping[str, SensorSettings], chosen: tuple[str, ...], system: System
 ) -> dict[str, Any]:
-    """The options of the class; its constructor checks them too, if all that it needs is there."""
+    """The options of the class; its constructor checks them too, if it is asked and all that it needs is there."""
     if kind.cls is None:
         return table.rest()
     cls = kind.cls
     own = FilterOptions(cls)
     options = own.read(table)
+    if not table.problems.makes_filters:
+        return options
     noted = table.problems.are_in
     has_sensors = chosen and not noted(table.path, "sensors") and not any(noted(f"sensors.{name}") for name in chosen)
     has_boxes = not noted("model.prior") and not noted("model.domain")

@@ -46,30 +46,39 @@ def load(
     environment: Mapping[str, str] | None = None,
     *,
     reads_files: bool = True,
+    makes_filters: bool = True,
 ) -> Configuration:
-    """Read and check a configuration; files of measurements are looked into only if ``reads_files``.
+    """Read and check a configuration.
+
+    Files of measurements are looked into only if ``reads_files``. Each filter is made once, so that its class checks
+    its own options, only if ``makes_filters``: that loads kernels, which a process without filters does not need.
 
     Raises
     ------
     ConfigurationError
         With one record per mistake: file, table, key, what was found and expected, the nearest valid name, the line.
     """
-    return _load(path, overrides, environment, reads_files)[0]
+    return _load(path, overrides, environment, reads_files=reads_files, makes_filters=makes_filters)[0]
 
 
 def load_with_keys(
     path: Path, overrides: Sequence[str] = (), environment: Mapping[str, str] | None = None
 ) -> tuple[Configuration, set[str]]:
     """The configuration and the paths of all keys that the schema knows for it."""
-    return _load(path, overrides, environment, True)
+    return _load(path, overrides, environment)
 
 
 def _load(
-    path: Path, overrides: Sequence[str], environment: Mapping[str, str] | None, reads_files: bool
+    path: Path,
+    overrides: Sequence[str],
+    environment: Mapping[str, str] | None,
+    *,
+    reads_files: bool = True,
+    makes_filters: bool = True,
 ) -> tuple[Configuration, set[str]]:
     text = _read_text(path)
     values = _read_toml(path, text)
-    problems = Problems(str(path), reads_files=reads_files, lines=key_lines(text))
+    problems = Problems(str(path), reads_files=reads_files, makes_filters=makes_filters, lines=key_lines(text))
     apply(values, from_environment(environment or {}), problems)
     apply(values, from_flags(overrides, problems), problems)
     return _checked(values, path, problems), problems.asked

@@ -114,10 +114,19 @@ class Problems:
     ``lines`` holds the line of each ``table.key`` of the file, ``sources`` the flag or variable that gave a value.
     """
 
-    def __init__(self, file: str, *, reads_files: bool = True, lines: Mapping[str, int] | None = None) -> None:
+    def __init__(
+        self,
+        file: str,
+        *,
+        reads_files: bool = True,
+        makes_filters: bool = True,
+        lines: Mapping[str, int] | None = None,
+    ) -> None:
         self.file = file
         self.reads_files = reads_files
         """Whether files of measurements are looked into; of a recorded configuration they may be gone."""
+        self.makes_filters = makes_filters
+        """Whether each filter is made once, so that its class checks its options, which loads kernels."""
         self.lines = dict(lines or {})
         self.sources: dict[str, str] = {}
         self.records: list[Problem] = []

@@ -14,7 +14,7 @@ from lsu_mesh_services.session import session_settings, with_session
 
 
 def main(options: argparse.Namespace) -> int:
-    configuration = load_or_explain(options.config, options)
+    configuration = load_or_explain(options.config, options, makes_filters=False)
     if configuration is None:
         return USAGE
     if not configuration.network.ros2.publish:

@@ -33,7 +33,7 @@ PRIORITY = 5
 
 
 def main(options: argparse.Namespace) -> int:
-    configuration = load_or_explain(options.config, options)
+    configuration = load_or_explain(options.config, options, makes_filters=False)
     if configuration is None:
         return USAGE
     try:

@@ -24,7 +24,7 @@ def main(options: argparse.Namespace) -> int:
         return run_tool(
             options, lambda configuration, _: _draw(configuration, options, _present(configuration, options))
         )
-    configuration = load_or_explain(options.config, options)
+    configuration = load_or_explain(options.config, options, makes_filters=False)
     return USAGE if configuration is None else _draw(configuration, options, None)
 
 

@@ -27,7 +27,7 @@ TITLES = {"contradictions": "contra", "step_ms": "step ms"}
 
 
 def main(options: argparse.Namespace) -> int:
-    configuration = load_or_explain(options.config, options)
+    configuration = load_or_explain(options.config, options, makes_filters=False)
     if configuration is None:
         return USAGE
     return with_session("health", lambda: _tell(configuration, options))

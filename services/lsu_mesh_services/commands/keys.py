@@ -19,7 +19,7 @@ MAX_DAYS = 3650
 
 def main(options: argparse.Namespace) -> int:
     options.overrides = [*options.overrides, "network.tls.enabled=true"]  # names are checked as they will be used
-    configuration = load_or_explain(options.file, options)
+    configuration = load_or_explain(options.file, options, makes_filters=False)
     if configuration is None:
         return USAGE
     if not 1 <= options.days <= MAX_DAYS:

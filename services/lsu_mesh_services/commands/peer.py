@@ -18,9 +18,13 @@ from lsu_mesh_services.exit_codes import COULD_NOT_START, USAGE
 from lsu_mesh_services.extras import ROS2
 from lsu_mesh_services.session import session_settings, with_session
 
+ESTIMATING = ("filter", "fusion", "identifier")
+"""Roles that check the options of all filters; the others load no kernel."""
+
 
 def main(options: argparse.Namespace) -> int:
-    configuration = load_or_explain(options.config, options)
+    makes_filters = options.role in ESTIMATING
+    configuration = load_or_explain(options.config, options, makes_filters=makes_filters)
     if configuration is None:
         return USAGE
     known = [name for role, name in configuration.peers() if role == options.role]

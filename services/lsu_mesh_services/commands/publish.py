@@ -77,7 +77,7 @@ def _settings(options: argparse.Namespace) -> Settings | None:
         if options.overrides or any(name.startswith("LSU_MESH_") for name in os.environ):
             from lsu_mesh_services.configuration import load_or_explain
 
-            configuration = load_or_explain(options.config, options)
+            configuration = load_or_explain(options.config, options, makes_filters=False)
             if configuration is None:
                 return None
             settings = Settings.of(configuration.values, path.parent)

@@ -31,7 +31,7 @@ def _settings(options: argparse.Namespace) -> SessionSettings | None:
     """With a configuration: its entry, certificates and rules; None when it has mistakes."""
     files, default = None, DEFAULT_LISTEN
     if options.config is not None:
-        configuration = load_or_explain(options.config, options)
+        configuration = load_or_explain(options.config, options, makes_filters=False)
         if configuration is None:
             return None
         files, default = certificates(configuration, ROUTER), configuration.network.entry

@@ -12,7 +12,7 @@ from lsu_mesh_services.mesh_launcher import run_mesh
 
 
 def main(options: argparse.Namespace) -> int:
-    configuration = load_or_explain(options.file, options)
+    configuration = load_or_explain(options.file, options, makes_filters=False)
     if configuration is None:
         return USAGE
     if options.no_record and (options.view or options.web is not None):

@@ -127,7 +127,7 @@ def watching(configuration: Configuration, options: argparse.Namespace) -> Itera
 
 def run_tool(options: argparse.Namespace, work: Callable[[Configuration, argparse.Namespace], int]) -> int:
     """Load the configuration, do the work, and turn what goes wrong into words and exit codes."""
-    configuration = load_or_explain(options.config, options)
+    configuration = load_or_explain(options.config, options, makes_filters=False)
     if configuration is None:
         return USAGE
     try:
