@@ -182,7 +182,7 @@ class Peer:
                 break
             self._publish(self._take(arrival))
             arrival = self._bus.next(0) if taken < self._node.takes_at_once else None
-        self._publish(self._node.tick(self._clock.now()))
+        self._publish(self._node.work(self._clock.now()))
         self._measure(queued, age_ns, self._clock.now() - began)
 
     def _measure(self, queued: int, age_ns: int, took_ns: int) -> None:
