@@ -55,6 +55,8 @@ class Estimator(StartingNode):
         self._has_more = False
         """Whether the last tick has left steps that may be ready."""
         self.last_posterior: Posterior | None = None
+        self.predicts = True
+        """Whether predictions are published; the service around the node knows whether anybody takes them."""
         self.absent: set[str] = set()
         """Sources that are known to be gone and are not waited for."""
 
@@ -179,7 +181,8 @@ class Estimator(StartingNode):
                     self._start_over_behind_lost_inputs(k, now)
                 break
             told = self._take_remarks()
-            if step.published is not None and not self.held.unsound and not self.timeline.is_behind():
+            is_told = self.predicts and step.published is not None
+            if is_told and not self.held.unsound and not self.timeline.is_behind():
                 told += self.prediction(k + 1, now)
             count += len(told)
             yield from told

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lsu_mesh.mesh.messages import Health, Input, Measurement, encode
+from lsu_mesh.mesh.messages import Health, Input, Measurement, Posterior, Prediction, encode
 
 MakeMesh = Callable[..., Any]
 STEPS = 12
@@ -73,3 +73,17 @@ def test_the_messages_of_a_turn_are_those_of_a_tick(mesh_of: MakeMesh) -> None:
     for topic in {message.topic for message in told}:
         sequence = [message.seq for message in told if message.topic == topic]
         assert sequence == list(range(len(sequence))), "in the order in which they leave"
+
+
+@pytest.mark.parametrize("kind", ["LSUCZ", "LSUPB", "ZonotopicKalman", "WindowMAP"])
+def test_without_predictions_the_sets_are_the_same(mesh_of: MakeMesh, kind: str) -> None:
+    domain = ("model.domain.lower=[-9.0, -9.0, -9.0]", "model.domain.upper=[9.0, 9.0, 9.0]")
+    overrides = (f'filters.cz={{kind="{kind}", sensors=["s2", "s3"]}}', 'fusion.main.sources=["box", "para"]', *domain)
+    (one, now), (silent, _) = (fed(mesh_of, "filter", "cz", *overrides) for _ in range(2))
+    silent.predicts = False
+    told, rest = one.tick(now), silent.tick(now)
+    assert len([message for message in told if isinstance(message, Prediction)]) == STEPS
+    assert [message for message in rest if isinstance(message, Prediction)] == []
+    sets = [[encode(message) for message in found if isinstance(message, Posterior)] for found in (told, rest)]
+    assert sets[0] == sets[1]
+    assert len(sets[0]) == STEPS
