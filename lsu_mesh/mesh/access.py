@@ -39,6 +39,19 @@ def published_topics(configuration: Configuration, role: str, name: str) -> tupl
     return tuple(topic for topic in PUBLISHES[role] if topic != "smoothed" or smooths)
 
 
+def taken_predictions(configuration: Configuration) -> set[str]:
+    """Filters whose predictions other filters take; those of the rest are computed only while somebody listens."""
+    listed = [address for name in configuration.filters for address in _of_filter(configuration, name)]
+    return {name for topic, name in listed if topic == "prediction"}
+
+
+def recorded(configuration: Configuration) -> list[tuple[str, str]]:
+    """``(topic, name)`` of what a recorder listens to: all, but of the predictions those that sets are made from."""
+    topics = [(topic, "*") for topic in TOPICS if topic not in ("live", "prediction")]
+    names = ["*"] if configuration.recorder.predictions else sorted(taken_predictions(configuration))
+    return [*topics, *(("prediction", name) for name in names)]
+
+
 def subscriptions(configuration: Configuration, role: str, name: str) -> list[tuple[str, str]]:
     """``(topic, name)`` of everything that a node listens to."""
     if role == "sensor":
@@ -60,7 +73,7 @@ def access(configuration: Configuration, role: str, name: str) -> Access:
     mesh = configuration.mesh.name
     topics = (*published_topics(configuration, role, name), *EVERY_PEER)
     if role == "recorder":
-        reads = tuple(key(mesh, topic, "*") for topic in TOPICS if topic != "live")
+        reads = tuple(key(mesh, topic, other) for topic, other in recorded(configuration))
     else:
         listed = [*subscriptions(configuration, role, name), ("health", name)]  # its own: whether it runs twice
         reads = tuple(key(mesh, topic, other) for topic, other in listed)

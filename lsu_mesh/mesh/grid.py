@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
@@ -37,9 +38,16 @@ class Grid:
                 f"dt = {self.dt} s from {self.start_ns} ns is beyond the ±146 years that are counted in ns"
             )
 
+    @cached_property
+    def _step_ns(self) -> tuple[int, int]:
+        """``dt`` in ns as numerator and denominator: peers ask for times dozens of times a step."""
+        return (self.dt * NS).as_integer_ratio()
+
     def time_of(self, k: int) -> int:
         """``t_k`` in ns."""
-        return self.start_ns + round(k * self.dt * NS)
+        p, q = self._step_ns
+        whole, rest = divmod(k * p, q)
+        return self.start_ns + whole + (2 * rest > q or (2 * rest == q and whole % 2 == 1))
 
     def step_of(self, t_ns: int) -> int:
         """The step k with ``t_{k−1} < t ≤ t_k``."""
@@ -62,8 +70,7 @@ class Grid:
 
     def times_of(self, k: Integers) -> Integers:
         """:meth:`time_of` of an array."""
-        step_ns = self.dt * NS
-        p, q = step_ns.numerator, step_ns.denominator
+        p, q = self._step_ns
         if not self._fits(k, p, q):
             return np.array([self.time_of(one) for one in k.tolist()], dtype=np.int64)
         if q == 1:
@@ -77,8 +84,7 @@ class Grid:
 
     def steps_of(self, t_ns: Integers) -> Integers:
         """:meth:`step_of` of an array."""
-        step_ns = self.dt * NS
-        p, q = step_ns.numerator, step_ns.denominator
+        p, q = self._step_ns
         if q * p >= _SAFE or not self._is_near(t_ns):
             return np.array([self.step_of(one) for one in t_ns.tolist()], dtype=np.int64)
         # since = a p + b with 0 ≤ b < p, so ceil(since q / p) = a q + ceil(b q / p)

@@ -115,7 +115,7 @@ class Replay:
         while self._pending:
             name = min(self._pending, key=self._order.__getitem__)
             self._pending.remove(name)
-            for message in self.nodes[name].advance(now):
+            for message in list(self.nodes[name].advance(now)):
                 yield Timed(now, message)
                 yield from self._hand_over(message, now)
 

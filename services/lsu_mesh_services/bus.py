@@ -158,6 +158,18 @@ class Bus:
 
         self._declared.append(self._session.liveliness().declare_subscriber(key, changed, history=True))
 
+    def watch_listeners(self, key: str) -> None:
+        """Queue when the first listener of a key comes and when the last has left; no word: there is none.
+
+        A plain publisher beside the advanced one, which cannot tell; asking it would cost as much as a message.
+        """
+
+        def changed(status: Any) -> None:
+            self._arrivals.put(Arrival("listened" if status.matching else "unheard", key, b"", self._clock.now()))
+
+        publisher = self._session.declare_publisher(key, allowed_destination=zenoh.Locality.REMOTE)
+        self._declared += [publisher, publisher.declare_matching_listener(changed)]
+
     def keep(self, count: int) -> None:
         """How many messages publishers that are declared from now on keep for those who come late."""
         self._settings = replace(self._settings, cache=count)

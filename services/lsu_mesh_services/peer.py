@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
+from lsu_mesh.mesh.access import taken_predictions
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
@@ -134,6 +135,9 @@ class Peer:
         self._bus.declare_alive(key(self._mesh, "live", self._node.name))
         if isinstance(self._node, FilterNode):
             self._bus.ask(last_key(self._mesh, self._node.name))
+            self._node.predicts = self._node.name in taken_predictions(self._node.configuration)
+            if not self._node.predicts:
+                self._bus.watch_listeners(key(self._mesh, "prediction", self._node.name))
         if isinstance(self._node, FusionNode):
             for name in self._node.sources:
                 self._answer_last(self._node, name)
@@ -182,7 +186,7 @@ class Peer:
                 break
             self._publish(self._take(arrival))
             arrival = self._bus.next(0) if taken < self._node.takes_at_once else None
-        self._publish(self._node.tick(self._clock.now()))
+        self._publish(self._node.work(self._clock.now()))
         self._measure(queued, age_ns, self._clock.now() - began)
 
     def _measure(self, queued: int, age_ns: int, took_ns: int) -> None:
@@ -235,6 +239,9 @@ class Peer:
             if self._start.receives(arrival.key, arrival.payload):
                 return []
             return self._node.deliver(self._canonical(arrival.key), arrival.payload, arrival.arrival_ns)
+        if arrival.what in ("listened", "unheard") and isinstance(self._node, Estimator):
+            self._node.predicts = arrival.what == "listened"
+            return []
         if arrival.what == "alive":
             self._start.somebody_came(arrival.arrival_ns)
         address = parse(arrival.key)

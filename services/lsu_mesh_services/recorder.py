@@ -1,4 +1,4 @@
-"""The recorder process: subscribes to everything, owns the only recording."""
+"""The recorder process: subscribes to what a mesh tells, owns the only recording."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from lsu_mesh.mesh.access import recorded
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DuplicateProcess
-from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
+from lsu_mesh.mesh.keys import key, parse
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
@@ -135,11 +136,10 @@ class RecorderService:
         """Every peer of the mesh tells its health every second; of whom nothing is heard, nothing is recorded."""
 
     def declare(self) -> None:
-        """Subscribe to all topics, watch the peers, show that the recorder is there."""
+        """Subscribe to what is recorded, watch the peers, show that the recorder is there."""
         self._bus.announce(key(self._mesh, "health", ROLE_NAME))
-        for topic in TOPICS:
-            if topic != "live":
-                self._bus.subscribe(f"{PREFIX}/{self._mesh}/{topic}/*")
+        for topic, name in recorded(self._configuration):
+            self._bus.subscribe(key(self._mesh, topic, name))
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", ROLE_NAME))
 

@@ -51,6 +51,8 @@ sensors = ["s1"]
 deadline = "40ms"
 [fusion.main]
 sources = ["f", "g"]
+[recorder]
+predictions = true
 """
 
 

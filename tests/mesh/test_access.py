@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lsu_mesh.mesh.access import Access, access, reader_access
+from lsu_mesh.mesh.access import Access, access, reader_access, taken_predictions
 from lsu_mesh.mesh.config import Configuration, load
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.nodes.filter import FilterNode
@@ -67,7 +67,23 @@ def test_a_node_listens_to_what_it_may_read(configuration: Configuration) -> Non
     assert {name for _, name in fusion.subscriptions()} == {"box", "para", "cz", "plant"}
 
 
+def test_a_recorder_reads_all_and_of_the_predictions_those_that_filters_take(root: Path) -> None:
+    def read(*overrides: str) -> set[str]:
+        found = load(root / "examples" / "mesh.toml", overrides)
+        reads = access(found, "recorder", "recorder").reads
+        assert set(reads) >= {f"lsu/v1/example/{topic}/*" for topic in ("truth", "measurement", "posterior", "event")}
+        predictions = {key.rpartition("/")[2] for key in reads if "/prediction/" in key}
+        assert predictions == {"*"} or predictions == taken_predictions(found)
+        return predictions
+
+    assert read() == set()
+    assert read("filters.cz.transfer=fused") == set(), "a fused set is no prediction"
+    assert read("filters.cz.transfer=predictor") == {"box", "para", "zonotope"}
+    assert read("filters.cz.transfer=predictor", 'filters.cz.transfer_from=["box"]') == {"box"}
+    assert read("recorder.predictions=true") == {"*"}
+
+
 def test_readers_publish_nothing_and_answer_nothing(configuration: Configuration) -> None:
     may = reader_access(configuration)
     assert (may.publishes, may.answers) == ((), ())
-    assert "lsu/v1/example/posterior/*" in may.reads
+    assert {f"lsu/v1/example/{topic}/*" for topic in ("posterior", "prediction")} <= set(may.reads)

@@ -37,8 +37,12 @@ def brute_step(grid: Grid, t: int) -> int:
 
 
 @given(start=starts, dt=dts, k=st.integers(-(10**6), 10**6))
+@example(start=1, dt=Fraction(3, 2 * NS), k=1)
+@example(start=1, dt=Fraction(3, 2 * NS), k=3)
+@example(start=1, dt=Fraction(3, 2 * NS), k=-1)
 def test_a_step_is_the_rounded_exact_time(start: int, dt: Fraction, k: int) -> None:
     grid = Grid(start, dt)
+    assert grid.time_of(k) == start + round(k * dt * NS), "halves to the even one"
     assert abs(grid.time_of(k) - start - k * dt * NS) <= Fraction(1, 2)
     assert grid.step_of(grid.time_of(k)) == k
     assert grid.distance(grid.time_of(k)) == 0

@@ -213,6 +213,8 @@ class RecorderSettings:
     flush: float = 0.2
     mesh_hz: float = 10.0
     axes: tuple[str, ...] = ()
+    predictions: bool = False
+    """Whether predictions that no filter takes are recorded too, and so computed at all."""
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,13 @@
 
 At each step the node collects what its sources send, combines it when all have come or the deadline has passed,
 publishes, and predicts with the input. What comes late rewinds to its step. A missing input is never guessed.
+A set is handed out as soon as it stands, before the next step's prediction is computed.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -53,6 +55,8 @@ class Estimator(StartingNode):
         self._has_more = False
         """Whether the last tick has left steps that may be ready."""
         self.last_posterior: Posterior | None = None
+        self.predicts = True
+        """Whether predictions are published; the service around the node knows whether anybody takes them."""
         self.absent: set[str] = set()
         """Sources that are known to be gone and are not waited for."""
 
@@ -150,14 +154,14 @@ class Estimator(StartingNode):
                 found.append(self.event("INFO", news.code, news.text, now=now, step=self.step(), about=about))
         return found
 
-    def advance(self, now: int) -> list[Message]:
+    def advance(self, now: int) -> Iterator[Message]:
         dirty = self.timeline.take_dirty()
         if dirty is not None:
             self._rewind(dirty)
         self._has_more = False
         if self.current is None and not self._start(now):
-            return []
-        messages: list[Message] = []
+            return
+        count = 0
         for left in reversed(range(self._steps_at_once())):
             assert self.current is not None
             k = self.current
@@ -169,19 +173,24 @@ class Estimator(StartingNode):
                 self._waiting = self.lacks_input(k, step, now)
                 if self._waiting:
                     break
-                messages += self._close(k, step, now)
+                for message in self._close(k, step, now):
+                    count += 1
+                    yield message
             if not self._predict(k, step, now):
                 if self.timeline.input_is_lost(k):
                     self._start_over_behind_lost_inputs(k, now)
                 break
-            messages += self._take_remarks()
-            if step.published is not None and not self.held.unsound and not self.timeline.is_behind():
-                messages += self.prediction(k + 1, now)
+            told = self._take_remarks()
+            is_told = self.predicts and step.published is not None
+            if is_told and not self.held.unsound and not self.timeline.is_behind():
+                told += self.prediction(k + 1, now)
+            count += len(told)
+            yield from told
             # a step that was published before is done again: all that a late message changes is told in one tick
-            self._has_more = left == 0 or (len(messages) >= MAX_MESSAGES and not self.timeline.is_published(k + 1))
+            self._has_more = left == 0 or (count >= MAX_MESSAGES and not self.timeline.is_published(k + 1))
             if self._has_more:
                 break
-        return messages + self._take_remarks()
+        yield from self._take_remarks()
 
     def _start_over_behind_lost_inputs(self, k: int, now: int) -> None:
         last = self.timeline.last_lost_input(k)
@@ -215,11 +224,11 @@ class Estimator(StartingNode):
         waits = not self.timeline.is_combined or self.configuration.input_box is not None
         return sign + self.deadline if sign is not None and waits else None
 
-    def _close(self, k: int, step: Step, now: int) -> list[Message]:
-        """Combine the step's data and publish the result if it is new."""
+    def _close(self, k: int, step: Step, now: int) -> Iterator[Message]:
+        """Combine the step's data and publish the result if it is new, before what goes beside it is computed."""
         held = self.held
         step.before = held.snapshot()
-        combined, messages = self.combine(k, step, now)
+        combined, events = self.combine(k, step, now)
         step.closed = True
         self.timeline.is_combined = True
         if held.is_restarted and combined.status != "inconsistent":
@@ -228,13 +237,16 @@ class Estimator(StartingNode):
         held.record_used(combined.used)
         # a base that is no message does not say its step: the first posterior since then is always published
         may_skip = combined.status in ("ok", "predicted") and len(held.used) < MAX_USED and held.tells_step
+        yield from events
         if held.unsound and self.last_posterior is None:
-            return messages
+            return
         if step.published is None and self.timeline.is_behind() and may_skip:
             self._counts["behind"] += 1
-            return messages
+            return
         posterior = self._publish(k, step, combined, now)
-        return messages if posterior is None else [*messages, posterior, *self.beside(posterior, step, now)]
+        if posterior is not None:
+            yield posterior
+            yield from self.beside(posterior, step, now)
 
     def _publish(self, k: int, step: Step, combined: Combined, now: int) -> Posterior | None:
         """The posterior's message, or None when the step was published before with the same set and sources."""

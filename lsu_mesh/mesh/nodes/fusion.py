@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 from lsu_mesh.fusion.policies import POLICIES
@@ -95,9 +95,10 @@ class FusionNode(Estimator):
         if old is None or old.boot != message.boot or old.seq < message.seq:
             self.take(name, message, now)
 
-    def advance(self, now: int) -> list[Message]:
+    def advance(self, now: int) -> Iterator[Message]:
         self._sense_silence(now)
-        return [*self._skip_ahead(now), *super().advance(now)]
+        yield from self._skip_ahead(now)
+        yield from super().advance(now)
 
     def _skip_ahead(self, now: int) -> list[Message]:
         """Far behind, continue at the sources' step, like a fusion that starts late: their sets suffice to start."""

@@ -6,7 +6,7 @@ No clock, socket, thread or random source in here. ``now`` is nanoseconds of a c
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from lsu_mesh.mesh.admission import DUPLICATE_PUBLISHER, Admission
@@ -99,8 +99,8 @@ class Node(ABC):
         """Take a message that was admitted; return what to publish."""
 
     @abstractmethod
-    def advance(self, now: int) -> list[Message]:
-        """Do what is due by ``now``; return what to publish."""
+    def advance(self, now: int) -> Iterable[Message]:
+        """Do what is due by ``now``, to the end of the iteration; what to publish, each as soon as it stands."""
 
     def deliver(self, address: str, payload: bytes, now: int) -> list[Message]:
         """Admission and :meth:`receive`."""
@@ -114,17 +114,23 @@ class Node(ABC):
         """The liveliness token of another peer came or went."""
         self._publishers.record_alive(name, is_there, now)
 
-    def tick(self, now: int) -> list[Message]:
-        """:meth:`advance`, and a health message once a second."""
-        messages = self.advance(now)
+    def work(self, now: int) -> Iterator[Message]:
+        """:meth:`advance`, and a health message once a second; each message before what comes after it is computed.
+
+        Whoever publishes a message at once saves its readers the wait for the rest. The iteration has to be exhausted.
+        """
+        yield from self.advance(now)
         if warnings := self.warnings(now):
-            messages = [*messages, *warnings]
+            yield from warnings
             self.next_health = now  # whoever reads the health is told at once
         self._waited(now)
         if now >= self.next_health:
             self.next_health = now + SECOND
-            messages.append(self.health(now))
-        return messages
+            yield self.health(now)
+
+    def tick(self, now: int) -> list[Message]:
+        """All of :meth:`work`."""
+        return list(self.work(now))
 
     def warnings(self, now: int) -> list[Message]:
         """Events about what has just been found wrong around the node, and stands in its health as long as it is so."""

@@ -54,6 +54,7 @@ TAKEN: dict[str, set[str]] = {
     "fusion.*.faults": {"zero"}, "fusion.*.max_lag": {"whole", "zero"}, "fusion.*.quarantine_after": WHOLE,
     "fusion.*.max_generators": WHOLE, "fusion.*.max_constraints": {"whole", "zero"},
     "recorder.path": TEXT, "recorder.mesh_hz": POSITIVE, "recorder.axes": {"empty list", "texts"},
+    "recorder.predictions": FLAG,
     "network.listen": {"empty list"}, "network.connect": {"empty list"}, "network.cache": WHOLE,
     "network.tls.enabled": FLAG, "network.tls.authority": TEXT, "network.tls.certificate": TEXT,
     "network.tls.key": TEXT, "network.tls.access_control": FLAG, "network.tls.verify_hosts": FLAG,

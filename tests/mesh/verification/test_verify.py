@@ -52,6 +52,19 @@ def lossy(seed: int, share: float = 0.2) -> Callable[..., bool]:
     return carry
 
 
+@pytest.mark.parametrize("seed", [None, 3])
+def test_a_recording_without_predictions(mesh_of: MakeMesh, seed: int | None) -> None:
+    mesh = mesh_of("mesh.steps=100", carry=None if seed is None else lossy(seed))
+    for node in mesh.nodes.values():
+        node.predicts = False
+    mesh.run(2.6)
+    assert mesh.of(Prediction) == []
+    found = check(mesh)
+    assert set(found.exact) == {("filter/box", "posterior"), ("filter/cz", "posterior"), ("filter/para", "posterior"),
+                                ("fusion/main", "fused")}  # fmt: skip
+    assert found.exact.total() == found.containment.holding >= 390
+
+
 def test_the_demo(mesh_of: MakeMesh) -> None:
     mesh = mesh_of("mesh.steps=100")
     mesh.run(2.2)

@@ -29,7 +29,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_text_names_each_key_with_its_readers(capsys: pytest.CaptureFixture[str]) -> None:
     text = printed(capsys)
     assert "plant\n  truth/plant → s1, s2, s3, recorder\n" in text
-    assert "filter cz\n  prediction/cz → recorder\n  posterior/cz  → main, recorder\n" in text
+    assert "filter cz\n  prediction/cz → no reader\n  posterior/cz  → main, recorder\n" in text
+    assert "prediction/cz → recorder" in printed(capsys, "-X", "recorder.predictions=true")
 
 
 def test_dot_has_the_edges_of_the_configuration(capsys: pytest.CaptureFixture[str]) -> None:
