@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -138,6 +139,15 @@ def family_step(engine: FusionEngine, sources: Sequence[Source]) -> FusionOutcom
     return _largest_family(
         engine, Families(engine.stack(), [source.told for source in sources], engine.limits), sources
     )
+
+
+def rehearse(engine: FusionEngine) -> None:
+    """Intersect sets of all kinds, so that nothing is loaded when the first ones come; the engine is left as it was."""
+    hull, stack = engine.support.interval_hull(), engine.stack()
+    for support in (hull, hull.to_parallelotope(), hull.to_constrained_zonotope()):
+        stack = stack.met(support, hull.bounds())
+    with suppress(InconsistentData):  # the set may be flat
+        stack.settled()
 
 
 def _as_it_is(engine: FusionEngine, basis: Literal["prediction", "contradiction"]) -> FusionOutcome:

@@ -19,6 +19,7 @@ from lsu_mesh.mesh.estimation.fusion_step import (
     fused_point,
     fusion_algorithm,
     fusion_step,
+    rehearse,
 )
 from lsu_mesh.mesh.estimation.message_fields import described_fusion
 from lsu_mesh.mesh.estimation.quarantine import Quarantine, Say
@@ -71,6 +72,10 @@ class FusionNode(Estimator):
     @property
     def history(self) -> int:
         return self.settings.max_lag
+
+    def warm_up(self) -> None:
+        super().warm_up()
+        rehearse(self.engine)
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return subscriptions(self.configuration, self.role, self.name)
