@@ -36,7 +36,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.kernels.linear_programs": [
         ("banded_program", "bordered_systems", "dual_bound", "simplex"),
         ("newton_step", "safe_maxima"),
-        ("interior_point", "vertex_enumeration"),
+        ("implied_ranges", "interior_point", "vertex_enumeration"),
         ("window_program",),
     ],
     "lsu_mesh.kernels.parallelotopes": [
@@ -48,7 +48,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.kernels.zonotopes": [
         ("zonotope", "lifted_zonotope"),
         ("constrained_zonotope", "constraint_elimination", "generator_reduction", "time_update", "parallel_generators"),
-        ("complexity_reduction", "zonotopic_kalman"),
+        ("complexity_reduction", "stack_reduction", "zonotopic_kalman"),
     ],
     "lsu_mesh.supports": [
         ("arrays", "exact", "exact_program", "polytope"),
@@ -75,7 +75,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("state",),
         ("batch_map", "window_map"),
     ],
-    "lsu_mesh.fusion": [("intersection", "point"), (REST,), ("policies",), ("fuse",)],
+    "lsu_mesh.fusion": [("point", "stack"), ("intersection",), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
         ("message_examples", "sets", "data_files", "ros2", "json_form"),

@@ -42,16 +42,21 @@ def joined(body: Body, bounds: tuple[Vector, Vector], other: Support, most_gener
     strips = strips_of(other)
     if strips is not None:
         P, y, r = strips
-        cuts = _cuts(bounds, other, P, y=y, r=r)
+        does_cut = cuts(bounds, other, P, y=y, r=r)
         rows = rows_of(P, 0, body[0].size // other.dim)
-        return _finite((body[0], *meet_strips(*body, rows, np.where(cuts, y, np.nan), r)), body) if cuts.any() else body
+        return with_strips(body, rows, np.where(does_cut, y, np.nan), r) if does_cut.any() else body
     met = other.to_constrained_zonotope()
     if most_generators is not None and met.generator_count > most_generators:
         return joined(body, bounds, other.interval_hull(), most_generators)
-    return _finite((body[0], *meet_sets(*body, *met.arrays)), body)
+    return finite_body((body[0], *meet_sets(*body, *met.arrays)), body)
 
 
-def _finite(met: Body, body: Body) -> Body:
+def with_strips(body: Body, P: Matrix, middle: Vector, radius: Vector) -> Body:
+    """X cut by ``|middle − P x| ≤ radius``, P (k, n), NaN for no strip."""
+    return finite_body((body[0], *meet_strips(*body, P, middle, radius)), body)
+
+
+def finite_body(met: Body, body: Body) -> Body:
     """The intersection, or X itself, which holds it, where its numbers have outgrown double precision."""
     return met if are_finite(*met) else body
 
@@ -66,7 +71,7 @@ def strips_of(support: Support) -> tuple[Matrix, Vector, Vector] | None:
     return support.strips() if isinstance(support, Parallelotope) else None
 
 
-def _cuts(bounds: tuple[Vector, Vector], other: Support, P: Matrix, y: Vector, r: Vector) -> NDArray[np.bool_]:
+def cuts(bounds: tuple[Vector, Vector], other: Support, P: Matrix, y: Vector, r: Vector) -> NDArray[np.bool_]:
     """Which strips do not hold the whole box; those of a box are compared without rounding."""
     if isinstance(other, Orthotope):
         return (bounds[0] < other.lower) | (bounds[1] > other.upper)

@@ -9,7 +9,9 @@ import numpy as np
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
+from lsu_mesh.fusion.stack import NO_LIMITS, Families
 from lsu_mesh.supports.arrays import frozen
+from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.intersection import Intersection
 from lsu_mesh.supports.support import Support
 
@@ -30,13 +32,22 @@ class Fusion(NamedTuple):
 
 def fuse_all(supports: Sequence[Support]) -> Fusion:
     """``∩ supports``; a single source keeps its class. ``InconsistentData`` where it is proved empty."""
-    joint = Intersection(supports)
-    try:
-        lower, upper = joint.bounds()
-    except InconsistentData as error:
-        raise InconsistentData("the supports are proved to have no common point") from error
-    support = supports[0] if len(supports) == 1 else joint.to_constrained_zonotope()
-    return Fusion(support, (lower, upper), frozen(0.5 * lower + 0.5 * upper), ())
+    return fuse_family(supports, families_of(supports), tuple(range(len(supports))))
+
+
+def families_of(supports: Sequence[Support]) -> Families:
+    """The stacks of families of supports, without limits. ``ModelError`` where the supports differ in dimension."""
+    return Families(None, [(part, part.bounds()) for part in Intersection(supports).parts], NO_LIMITS)
+
+
+def fuse_family(supports: Sequence[Support], families: Families, family: tuple[int, ...]) -> Fusion:
+    """``∩`` of the supports with these indices. ``InconsistentData`` where it is proved empty."""
+    settled = families.settled(family)
+    if settled is None:
+        raise InconsistentData("the supports are proved to have no common point")
+    lower, upper = settled.lower, settled.upper
+    support = supports[family[0]] if len(family) == 1 else ConstrainedZonotope.of_arrays(*settled.body)
+    return Fusion(support, (frozen(lower), frozen(upper)), frozen(0.5 * lower + 0.5 * upper), ())
 
 
 def meet_bounds(supports: Sequence[Support]) -> tuple[Vector, Vector]:

@@ -34,8 +34,8 @@ class Policy:
     sources_needed: Callable[[int], int]
     """How many sources must be there, by ``faults``, so that they hold the state by themselves."""
     is_intersection: bool = False
-    """Whether the result is ``∩ supports``. A fusion node then meets its own set with one source after another, and
-    can find the largest family of sources that agree; else it meets it with the result of ``function``."""
+    """Whether the result is ``∩ supports``. A fusion node then meets its own set with all sources at once, and can find
+    the largest family of sources that agree; else it meets it with the result of ``function``."""
 
 
 POLICIES: Mapping[str, Policy] = {
@@ -44,7 +44,7 @@ POLICIES: Mapping[str, Policy] = {
         Policy(
             "intersect",
             lambda supports, faults: fuse_all(supports),
-            algorithm=1,
+            algorithm=2,
             takes_faults=False,
             sources_needed=lambda faults: 1,
             is_intersection=True,
@@ -52,7 +52,7 @@ POLICIES: Mapping[str, Policy] = {
         Policy(
             "relaxed",
             fuse_relaxed,
-            algorithm=1,
+            algorithm=2,
             takes_faults=True,
             sources_needed=lambda faults: faults + 1,
         ),

@@ -16,7 +16,7 @@ import numpy as np
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData, ModelError
-from lsu_mesh.fusion.intersection import Fusion, fuse_all
+from lsu_mesh.fusion.intersection import Fusion, families_of, fuse_family
 from lsu_mesh.supports.arrays import frozen
 from lsu_mesh.supports.orthotope import Orthotope
 from lsu_mesh.supports.support import Support
@@ -57,12 +57,13 @@ def _consistent_families(
 ) -> list[tuple[tuple[int, ...], Fusion]]:
     """All families of ``size`` sources whose intersection is not proved empty, with that intersection."""
     disjoint = _disjoint_pairs(bounds)
+    families = families_of(supports)
     consistent = []
     for family in itertools.combinations(range(len(supports)), size):
         if any(pair in disjoint for pair in itertools.combinations(family, 2)):
             continue
         try:
-            consistent.append((family, fuse_all([supports[i] for i in family])))
+            consistent.append((family, fuse_family(supports, families, family)))
         except InconsistentData:
             continue
     return consistent

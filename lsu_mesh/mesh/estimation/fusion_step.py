@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,15 +15,17 @@ import numpy as np
 
 from lsu_mesh.array_types import Vector
 from lsu_mesh.errors import InconsistentData
-from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.lsucz import LSUCZ
 from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.fusion.point import point_of
 from lsu_mesh.fusion.policies import Policy
+from lsu_mesh.fusion.stack import Families, Stack, Told
 from lsu_mesh.mesh.config.settings import Configuration, FusionSettings
 from lsu_mesh.mesh.estimation.held_set import WEAKNESS
 from lsu_mesh.mesh.messages import Guarantee, Posterior
 from lsu_mesh.mesh.sets import to_support
+from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
+from lsu_mesh.supports.reduction import Limits, Settled
 from lsu_mesh.supports.support import Support
 
 ABANDONED = "descends from an epoch that was abandoned"
@@ -50,6 +53,11 @@ class Source:
         """The bounds that the source published."""
         return np.array(self.message.lower), np.array(self.message.upper)
 
+    @property
+    def told(self) -> Told:
+        """The set and the bounds."""
+        return self.support, self.bounds
+
 
 @dataclass(frozen=True)
 class FusionOutcome:
@@ -69,17 +77,32 @@ class FusionOutcome:
     """Sources that contradict the others."""
 
 
-def fusion_engine(configuration: Configuration, settings: FusionSettings) -> Filter:
-    """What holds the set of a fusion: a constrained zonotope of limited complexity, met with every source in turn."""
-    engine = LSUCZ(
-        configuration.base_model,
-        configuration.prior,
-        max_generators=settings.max_generators,
-        max_constraints=settings.max_constraints,
-        point="centre",
-    )
-    engine.skips_met = False
-    return engine
+class FusionEngine(LSUCZ):
+    """What holds the set of a fusion: a constrained zonotope of limited complexity."""
+
+    def __init__(self, configuration: Configuration, settings: FusionSettings) -> None:
+        super().__init__(
+            configuration.base_model,
+            configuration.prior,
+            max_generators=settings.max_generators,
+            max_constraints=settings.max_constraints,
+            point="centre",
+        )
+
+    @property
+    def limits(self) -> Limits:
+        """Generators and constraints of the fused set."""
+        return self._limits
+
+    def stack(self) -> Stack:
+        """A stack that begins with the set, and the box beside it."""
+        held = self.snapshot()
+        return Stack.of(held.body, held.lower, held.upper, self.limits)
+
+    def hold(self, settled: Settled) -> tuple[Vector, Vector]:
+        """Hold this set, and the box beside it; the box."""
+        self.resume(ConstrainedZonotope.of_arrays(*settled.body), settled.lower, settled.upper)
+        return settled.lower, settled.upper
 
 
 def fused_point(support: Support, bounds: tuple[Vector, Vector], used: Sequence[Source], rule: PointRule) -> Vector:
@@ -97,122 +120,97 @@ def fusion_algorithm(policy: Policy) -> int:
 
 
 def fusion_step(
-    engine: Filter, sources: Sequence[Source], policy: Policy, faults: int, *, has_prediction: bool
+    engine: FusionEngine, sources: Sequence[Source], policy: Policy, faults: int, *, has_prediction: bool
 ) -> FusionOutcome:
-    """Bring the sources of one step, by name, into the engine's set.
+    """Bring the sources of one step, by name, into the engine's set: one intersection, one reduction.
 
     ``has_prediction``: whether the engine's set may be believed; else it is left out. What is told afterwards (support
     and bounds) is all that the next step depends on.
     """
-    meeting = _Meeting(engine)
     if len(sources) < policy.sources_needed(faults) or not sources:
-        outcome = FusionOutcome("prediction", meeting.bounds)
-    elif policy.is_intersection:
-        outcome = _one_by_one(meeting, sources, has_prediction)
-    else:
-        outcome = _together(meeting, sources, policy, faults=faults, has_prediction=has_prediction)
-    engine.resume(engine.support, *outcome.bounds)
-    return outcome
+        return _as_it_is(engine, "prediction")
+    if policy.is_intersection:
+        return _intersected(engine, sources, has_prediction)
+    return _together(engine, sources, policy, faults=faults, has_prediction=has_prediction)
 
 
-def family_step(engine: Filter, sources: Sequence[Source]) -> FusionOutcome:
+def family_step(engine: FusionEngine, sources: Sequence[Source]) -> FusionOutcome:
     """Meet the engine's set with the largest family of sources that has a point in common with it."""
-    outcome = _largest_family(_Meeting(engine), sources)
-    engine.resume(engine.support, *outcome.bounds)
-    return outcome
+    return _largest_family(
+        engine, Families(engine.stack(), [source.told for source in sources], engine.limits), sources
+    )
 
 
-class _Meeting:
-    """The engine's set and its bounds, met with one source after another."""
-
-    def __init__(self, engine: Filter) -> None:
-        self._engine = engine
-        self.bounds = engine.bounds()
-
-    def snapshot(self) -> tuple[object, tuple[Vector, Vector]]:
-        return self._engine.snapshot(), self.bounds
-
-    def restore(self, snapshot: tuple[object, tuple[Vector, Vector]]) -> None:
-        self._engine.restore(snapshot[0])
-        self.bounds = snapshot[1]
-
-    def hold(self, support: Support, bounds: tuple[Vector, Vector]) -> None:
-        """Hold this alone; ``InconsistentData`` where it is empty."""
-        self._engine.reset(support)
-        self.bounds = bounds
-
-    def meet_all(self, sources: Sequence[Source]) -> bool:
-        return all(self.meet(source.support, source.bounds) for source in sources)
-
-    def meet(self, support: Support, bounds: tuple[Vector, Vector]) -> bool:
-        """Meet the set with another one; False, and unchanged, where the intersection is proved empty."""
-        lower, upper = np.maximum(self.bounds[0], bounds[0]), np.minimum(self.bounds[1], bounds[1])
-        if (lower > upper).any():
-            return False
-        before = self._engine.snapshot()
-        try:
-            self._engine.condition(support, gain=None)
-        except InconsistentData:
-            return False
-        own_lower, own_upper = self._engine.bounds()
-        lower, upper = np.maximum(lower, own_lower), np.minimum(upper, own_upper)
-        if (lower > upper).any():
-            self._engine.restore(before)
-            return False
-        self.bounds = (lower, upper)
-        return True
+def rehearse(engine: FusionEngine) -> None:
+    """Intersect sets of all kinds, so that nothing is loaded when the first ones come; the engine is left as it was."""
+    hull, stack = engine.support.interval_hull(), engine.stack()
+    for support in (hull, hull.to_parallelotope(), hull.to_constrained_zonotope()):
+        stack = stack.met(support, hull.bounds())
+    with suppress(InconsistentData):  # the set may be flat
+        stack.settled()
 
 
-def _one_by_one(meeting: _Meeting, sources: Sequence[Source], has_prediction: bool) -> FusionOutcome:
+def _as_it_is(engine: FusionEngine, basis: Literal["prediction", "contradiction"]) -> FusionOutcome:
+    """Nothing is met."""
+    bounds = engine.bounds()
+    engine.resume(engine.support, *bounds)
+    return FusionOutcome(basis, bounds)
+
+
+def _intersected(engine: FusionEngine, sources: Sequence[Source], has_prediction: bool) -> FusionOutcome:
     """Every source with the prediction; without the prediction where only that is wrong."""
-    before = meeting.snapshot()
-    if has_prediction and meeting.meet_all(sources):
-        return FusionOutcome("both", meeting.bounds, sources)
-    meeting.restore(before)
-    first, *others = sources
-    try:
-        meeting.hold(first.support, first.bounds)
-        do_agree = meeting.meet_all(others)
-    except InconsistentData:  # the source's own set is empty: it agrees with nobody
-        do_agree = False
-    if do_agree:
-        return FusionOutcome("sources", meeting.bounds, sources)
-    meeting.restore(before)
-    if has_prediction:
-        return _largest_family(meeting, sources)
-    return FusionOutcome("contradiction", meeting.bounds)
+    told, everyone = [source.told for source in sources], tuple(range(len(sources)))
+    with_prediction = Families(engine.stack(), told, engine.limits)
+    met = with_prediction.settled(everyone) if has_prediction else None
+    if met is not None:
+        return FusionOutcome("both", engine.hold(met), sources)
+    alone = Families(None, told, engine.limits).settled(everyone)
+    if alone is not None:
+        return FusionOutcome("sources", engine.hold(alone), sources)
+    return _largest_family(engine, with_prediction, sources) if has_prediction else _as_it_is(engine, "contradiction")
 
 
-def _largest_family(meeting: _Meeting, sources: Sequence[Source]) -> FusionOutcome:
+def _largest_family(engine: FusionEngine, families: Families, sources: Sequence[Source]) -> FusionOutcome:
     """As many sources as have a point in common with the set, the first by name of equal size."""
-    family = _find_family(meeting, sources)
-    rejected = [source for source in sources if source not in family]
-    return FusionOutcome("family", meeting.bounds, family, rejected)
+    family, met = _find_family(families, len(sources))
+    bounds = _as_it_is(engine, "prediction").bounds if met is None else engine.hold(met)
+    used = [sources[i] for i in family]
+    return FusionOutcome("family", bounds, used, [source for source in sources if source not in used])
 
 
-def _find_family(meeting: _Meeting, sources: Sequence[Source]) -> Sequence[Source]:
-    before = meeting.snapshot()
-    families = (f for size in range(len(sources) - 1, 0, -1) for f in itertools.combinations(sources, size))
-    for family in itertools.islice(families, MAX_FAMILIES):
-        if meeting.meet_all(family):
-            return family
-        meeting.restore(before)
-    return [source for source in sources if meeting.meet(source.support, source.bounds)]
+def _find_family(families: Families, count: int) -> tuple[tuple[int, ...], Settled | None]:
+    """The indices of the family and its set; none and ``None`` where no source has a point in common with the set."""
+    by_size = (f for size in range(count - 1, 0, -1) for f in itertools.combinations(range(count), size))
+    for family in itertools.islice(by_size, MAX_FAMILIES):
+        met = families.settled(family)
+        if met is not None:
+            return family, met
+    greedy: tuple[int, ...] = ()
+    found: Settled | None = None
+    for i in range(count):
+        met = families.settled((*greedy, i))
+        if met is not None:
+            greedy, found = (*greedy, i), met
+    return greedy, found
 
 
 def _together(
-    meeting: _Meeting, sources: Sequence[Source], policy: Policy, faults: int, has_prediction: bool
+    engine: FusionEngine, sources: Sequence[Source], policy: Policy, faults: int, has_prediction: bool
 ) -> FusionOutcome:
     """What the policy makes of all sources, with the prediction; without it where they have no point in common."""
     try:
         together = policy.function([source.support for source in sources], faults)
     except InconsistentData:
-        return FusionOutcome("contradiction", meeting.bounds)
+        return _as_it_is(engine, "contradiction")
     rejected = [sources[i] for i in together.rejected]
-    if has_prediction and meeting.meet(together.support, together.bounds):
-        return FusionOutcome("both", meeting.bounds, sources, rejected)
-    meeting.hold(together.support, together.bounds)
-    return FusionOutcome("sources", meeting.bounds, sources, rejected)
+    told = [(together.support, together.bounds)]
+    met = Families(engine.stack(), told, engine.limits).settled((0,)) if has_prediction else None
+    if met is not None:
+        return FusionOutcome("both", engine.hold(met), sources, rejected)
+    alone = Families(None, told, engine.limits).settled((0,))
+    if alone is None:
+        return _as_it_is(engine, "contradiction")
+    return FusionOutcome("sources", engine.hold(alone), sources, rejected)
 
 
 def fused_guarantee(guarantees: Sequence[Guarantee], faults: int) -> Guarantee:

@@ -11,14 +11,15 @@ from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.estimation.fusion_step import (
     ABANDONED,
     OUTVOTED,
+    FusionEngine,
     FusionOutcome,
     Source,
     family_step,
     fused_guarantee,
     fused_point,
     fusion_algorithm,
-    fusion_engine,
     fusion_step,
+    rehearse,
 )
 from lsu_mesh.mesh.estimation.message_fields import described_fusion
 from lsu_mesh.mesh.estimation.quarantine import Quarantine, Say
@@ -46,10 +47,12 @@ class FusionNode(Estimator):
     takes_at_once = 16384
     """Many: it can only know from the newest how far it is behind."""
 
+    engine: FusionEngine
+
     def __init__(self, configuration: Configuration, name: str, boot: str) -> None:
         self.settings = configuration.fusion[name]
         self._policy = POLICIES[self.settings.policy]
-        engine = fusion_engine(configuration, self.settings)
+        engine = FusionEngine(configuration, self.settings)
         super().__init__(configuration, name, boot, engine=engine, sources=self.settings.sources)
         self._rejected: list[Rejection] = []
         self._used: Sequence[Source] = ()
@@ -69,6 +72,10 @@ class FusionNode(Estimator):
     @property
     def history(self) -> int:
         return self.settings.max_lag
+
+    def warm_up(self) -> None:
+        super().warm_up()
+        rehearse(self.engine)
 
     def subscriptions(self) -> Sequence[tuple[str, str]]:
         return subscriptions(self.configuration, self.role, self.name)

@@ -20,10 +20,10 @@ from lsu_mesh.mesh.estimation.adoption import adopted_model, filter_algorithm, i
 from lsu_mesh.mesh.estimation.filter_step import Transfers, contradiction_rule, filter_step
 from lsu_mesh.mesh.estimation.fusion_step import (
     OUTVOTED,
+    FusionEngine,
     Source,
     fused_point,
     fusion_algorithm,
-    fusion_engine,
     fusion_step,
 )
 from lsu_mesh.mesh.estimation.message_fields import (
@@ -330,10 +330,12 @@ class FilterRecomputation(Recomputation):
 class FusionRecomputation(Recomputation):
     """The fused sets of one fusion."""
 
+    _engine: FusionEngine
+
     def __init__(self, configuration: Configuration, archive: Archive, name: str) -> None:
         self._settings = configuration.fusion[name]
         self._policy = POLICIES[self._settings.policy]
-        super().__init__(configuration, archive, fusion_engine(configuration, self._settings))
+        super().__init__(configuration, archive, FusionEngine(configuration, self._settings))
 
     @property
     def algorithm(self) -> tuple[str, int]:

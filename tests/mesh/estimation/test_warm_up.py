@@ -63,3 +63,35 @@ def test_a_state_that_leaves_its_domain_in_the_rehearsal_ends_only_that() -> Non
     demo_like = SimpleNamespace(input_box=None, has_one_model=True, continuous=None, input_delay_ns=0)
     warm_up(engine, demo_like)  # type: ignore[arg-type]
     assert np.array_equal(before, engine.bounds())
+
+
+FUSION = """
+from types import SimpleNamespace
+
+from lsu_mesh.fusion.policies import POLICIES
+from lsu_mesh.mesh.estimation.fusion_step import Source, fusion_step
+from lsu_mesh.mesh.nodes.fusion import FusionNode
+
+node = FusionNode(load(Path(sys.argv[1])), "main", "0" * 16)
+before = node.engine.snapshot()
+node.warm_up()
+assert node.engine.snapshot() is before, "left as it was"
+known = loaded()
+slanted = Parallelotope([0.0] * 3, np.eye(3) + 0.2)
+bundle = Orthotope([-0.1, -3.0, -3.0], [0.1, 3.0, 3.0]).to_constrained_zonotope().meet_strips([[1.0] * 3], [0.0], [0.5])
+sources = []
+for name, support in (("box", slanted.interval_hull()), ("cz", bundle), ("para", slanted)):
+    lower, upper = (side.tolist() for side in support.bounds())
+    sources.append(Source(name, SimpleNamespace(name=name, lower=lower, upper=upper), support))
+for _ in range(3):
+    assert fusion_step(node.engine, sources, POLICIES["intersect"], 0, has_prediction=True).basis == "both"
+    node.engine.predict(np.zeros(1))
+print(sorted(loaded() - known))
+"""
+
+
+def test_no_kernel_is_loaded_by_the_first_fusion(root: Path) -> None:
+    script = SCRIPT.split("node = ")[0] + FUSION
+    command = [sys.executable, "-P", "-c", script, str(root / "services" / "lsu_mesh_services" / "demo.toml")]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]", answer.stdout
