@@ -55,15 +55,24 @@ def parse(text: str, graph: Graph, names: Mapping[str, int], what: str) -> int:
         raise ExpressionError(f"{what} must be a text such as 'x + h*v', it is {text!r}")
     if len(text) > MAX_TEXT:
         raise ExpressionError(f"{what} has {len(text)} characters, at most {MAX_TEXT} are taken")
+    if "#" in text:
+        raise ExpressionError(f"{what}: an expression has no comments, '#' is not part of the language: {_shown(text)}")
+    flat = text.replace("\r", " ").replace("\n", " ").replace("\t", " ")  # a text may go over several rows
+    start = len(flat) - len(flat.lstrip())
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        tree = ast.parse(flat[start:], mode="eval")
     except SyntaxError as error:
-        raise ExpressionError(
-            f"{what}, row {error.lineno or 1}, column {error.offset or 1}: {error.msg}: {_shown(text)}"
-        ) from None
+        where = _place(text, start + max(0, (error.offset or 1) - 1))
+        raise ExpressionError(f"{what}, {where}: {error.msg}: {_shown(text)}") from None
     except (RecursionError, MemoryError, ValueError):
         raise ExpressionError(f"{what} is nested too deeply, or holds a character that no expression has") from None
-    return _Reader(text.strip(), graph, names, what).read(tree.body)
+    return _Reader(text, start, graph, names, what).read(tree.body)
+
+
+def _place(text: str, offset: int) -> str:
+    """Row and column of a character, both from 1."""
+    before = text[:offset]
+    return f"row {before.count(chr(10)) + 1}, column {offset - before.rfind(chr(10))}"
 
 
 def _shown(text: str) -> str:
@@ -73,12 +82,13 @@ def _shown(text: str) -> str:
 class _Reader:
     """Goes through the tree of one expression."""
 
-    def __init__(self, text: str, graph: Graph, names: Mapping[str, int], what: str) -> None:
-        self._text, self._graph, self._names, self._what = text, graph, names, what
+    def __init__(self, text: str, start: int, graph: Graph, names: Mapping[str, int], what: str) -> None:
+        self._text, self._start, self._graph, self._names, self._what = text, start, graph, names, what
 
     def _refuse(self, node: ast.AST, words: str) -> ExpressionError:
-        row, column = getattr(node, "lineno", 1), getattr(node, "col_offset", 0) + 1
-        return ExpressionError(f"{self._what}, row {row}, column {column}: {words} in {_shown(self._text)}")
+        offset = len(self._text[self._start :].encode()[: getattr(node, "col_offset", 0)].decode(errors="ignore"))
+        where = _place(self._text, self._start + offset)
+        return ExpressionError(f"{self._what}, {where}: {words} in {_shown(self._text)}")
 
     def read(self, node: ast.expr, depth: int = 0) -> int:
         """The graph's node; chains of binary operations are gone along without recursion."""
