@@ -19,7 +19,7 @@ TEXTS = {
     "x**-2 + +y": lambda m, x, y, th: x**-2 + y,
     "sin(x)*cos(y) - tan(th)": lambda m, x, y, th: m.sin(x) * m.cos(y) - m.tan(th),
     "sqrt(x*x + y**2) + x**0.5": lambda m, x, y, th: m.sqrt(x * x + y**2) + m.sqrt(x),
-    "hypot(x - 1, y - 2)": lambda m, x, y, th: m.hypot(x - 1, y - 2),
+    "hypot(x + 1, y + 2)": lambda m, x, y, th: m.hypot(x + 1, y + 2),
     "atan2(y, x) - th": lambda m, x, y, th: m.atan2(y, x) - th,
     "exp(-x/4) * log(y)": lambda m, x, y, th: m.exp(-x / 4) * m.log(y),
     "abs(th - 5) + atan(x) + asin(th/2) + acos(th/2)": lambda m, x, y, th: (
