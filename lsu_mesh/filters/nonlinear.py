@@ -70,7 +70,7 @@ class NonlinearFilter(Filter):
         self._refuse(model)
         if self.system.linear is not None:
             return self.filter.predict_output(u)
-        step, holds = data_step(self.system, *self.bounds(), *self._input(u), r=np.array(self.model.r))
+        step, holds = data_step(self.system, *self.bounds(), *self._seen(u), r=np.array(self.model.r))
         found = self.filter.predict_output(model=step)
         for i, is_enclosed in enumerate(holds):
             if not is_enclosed:
@@ -90,7 +90,7 @@ class NonlinearFilter(Filter):
         values, widths = output_vector(y, self.system.output_count), half_width_vector("r", r, np.array(self.model.r))
         if np.isnan(values).all():
             return self.support
-        before, u_box = self.filter.snapshot(), self._input(u)
+        before, u_box = self.filter.snapshot(), self._seen(u)
         lower, upper = self.bounds()
         best = before
         try:
@@ -129,6 +129,10 @@ class NonlinearFilter(Filter):
     def _refuse(self, model: LSUModel | None) -> None:
         if model is not None:
             raise ModelError("a nonlinear filter takes no model of one step")
+
+    def _seen(self, u: ArrayLike | Orthotope | None) -> tuple[Vector, Vector]:
+        """The box of the input where an output has one; else it is not read."""
+        return self._input(u if self.system.sees_inputs else np.zeros(self.system.input_count))
 
     def _input(self, u: ArrayLike | Orthotope | None) -> tuple[Vector, Vector]:
         if isinstance(u, Orthotope):

@@ -112,9 +112,17 @@ class NonlinearModel:
         ]
         self.linear = self._linear(rows_f, rows_g, nominal)
         """The same model with matrices, where every row is affine; else ``None``."""
+        sees = [sorted(j - n for j in graph.variables_of(row) if n <= j < n + p) for row in rows_g]
+        self.sees_inputs = any(sees)
+        """Whether a row of g has an input, so that an update needs u."""
+        if self.linear is None and self.sees_inputs:
+            D = np.zeros((m, p))
+            for i, seen in enumerate(sees):
+                D[i, seen] = 1.0
+            nominal = nominal.replace(D=D)
+        everything = list(range(n + p + q))
         self.nominal = nominal if self.linear is None else self.linear
         """A linear model with the same sizes, names and bounds, to make filters with; its matrices say nothing."""
-        everything = list(range(n + p + q))
         self.dynamics = compiled(graph, rows_f, everything)
         """f and its derivatives by states, inputs, noises."""
         self.measured = compiled(graph, rows_g, everything[: n + p])
