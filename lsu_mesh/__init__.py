@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         FilterBank,
         FilterRun,
         Kalman,
+        NonlinearFilter,
         OutputPrediction,
         TruncatedKalman,
         WindowMAP,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     )
     from lsu_mesh.fusion import Fusion, fuse
     from lsu_mesh.model import ContinuousModel, LSUModel
+    from lsu_mesh.nonlinear.model import NonlinearModel
     from lsu_mesh.simulation import Simulation, simulate
     from lsu_mesh.supports import ConstrainedZonotope, Intersection, Orthotope, Parallelotope, Support, Zonotope
 else:
@@ -37,12 +39,13 @@ else:
         {
             "lsu_mesh.errors": ("InconsistentData", "LsuMeshError", "ModelError", "UnboundedSupport"),
             "lsu_mesh.filters": (
-                "LSUCZ", "LSUO", "LSUP", "LSUPB", "Filter", "FilterBank", "FilterRun", "Kalman", "OutputPrediction",
-                "TruncatedKalman", "WindowMAP", "ZonotopicKalman", "run_filter",
+                "LSUCZ", "LSUO", "LSUP", "LSUPB", "Filter", "FilterBank", "FilterRun", "Kalman", "NonlinearFilter",
+                "OutputPrediction", "TruncatedKalman", "WindowMAP", "ZonotopicKalman", "run_filter",
             ),
             "lsu_mesh.fusion": ("Fusion", "fuse"),
             "lsu_mesh.metrics": (),
             "lsu_mesh.model": ("ContinuousModel", "LSUModel"),
+            "lsu_mesh.nonlinear.model": ("NonlinearModel",),
             "lsu_mesh.simulation": ("Simulation", "simulate"),
             "lsu_mesh.supports": (
                 "ConstrainedZonotope", "Intersection", "Orthotope", "Parallelotope", "Support", "Zonotope",
@@ -69,6 +72,8 @@ __all__ = [
     "LSUModel",
     "LsuMeshError",
     "ModelError",
+    "NonlinearFilter",
+    "NonlinearModel",
     "Orthotope",
     "OutputPrediction",
     "Parallelotope",

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lsu_mesh.filters.lsuo import LSUO
     from lsu_mesh.filters.lsup import LSUP
     from lsu_mesh.filters.lsupb import LSUPB
+    from lsu_mesh.filters.nonlinear import NonlinearFilter
     from lsu_mesh.filters.run import run_filter
     from lsu_mesh.filters.run_record import FilterRun
     from lsu_mesh.filters.truncated_kalman import TruncatedKalman
@@ -30,6 +31,7 @@ else:
             "lsu_mesh.filters.lsuo": ("LSUO",),
             "lsu_mesh.filters.lsup": ("LSUP",),
             "lsu_mesh.filters.lsupb": ("LSUPB",),
+            "lsu_mesh.filters.nonlinear": ("NonlinearFilter",),
             "lsu_mesh.filters.run": ("run_filter",),
             "lsu_mesh.filters.run_record": ("FilterRun",),
             "lsu_mesh.filters.truncated_kalman": ("TruncatedKalman",),
@@ -47,6 +49,7 @@ __all__ = [
     "FilterBank",
     "FilterRun",
     "Kalman",
+    "NonlinearFilter",
     "OutputPrediction",
     "TruncatedKalman",
     "WindowMAP",

@@ -1,0 +1,1 @@
+"""Interval arithmetic with outward rounding: elementary functions without libm, and tapes of operations."""

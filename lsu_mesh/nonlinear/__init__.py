@@ -1,0 +1,1 @@
+"""Nonlinear models: expressions, their derivatives, and linear steps that enclose them."""
