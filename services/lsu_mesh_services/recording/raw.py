@@ -2,12 +2,15 @@
 
 One entity per topic and name, ``/raw/<topic>/<name>``, and ``/raw/refused`` for payloads that are no message of this
 mesh. A row holds ``payload`` (bytes), ``key``, ``arrival_ns`` and ``number``, which orders all rows by arrival: it
-counts from the nanosecond at which the recorder started, so that a later part of a recording counts on.
+counts from the nanosecond at which the recorder started, so that a later part of a recording counts on. By its
+``crc`` a reader knows that the disk gave back what was written. Rerun compresses the rows of a flush together.
 """
 
 from __future__ import annotations
 
+import struct
 import time
+import zlib
 from collections import defaultdict
 from dataclasses import dataclass, field
 
@@ -17,7 +20,7 @@ import rerun as rr
 
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh_services.recording.entity_paths import path
-from lsu_mesh_services.recording.timeline import Moment, Timelines, wall_column
+from lsu_mesh_services.recording.timeline import Moment, step_columns, wall_column
 
 ARCHETYPE = "lsu.Raw"
 REFUSED = "/raw/refused"
@@ -31,15 +34,21 @@ class _Rows:
     numbers: list[int] = field(default_factory=list)
 
 
+def checksum(key: str, arrival_ns: int, number: int, payload: bytes) -> int:
+    """CRC-32 of a row: of the payload, after arrival and number (little-endian, 8 bytes each), after the key."""
+    return zlib.crc32(payload, zlib.crc32(struct.pack("<qQ", arrival_ns, number), zlib.crc32(key.encode())))
+
+
 class RawStore:
     """Collects raw payloads and sends them in batches."""
 
-    def __init__(self, stream: rr.RecordingStream, timelines: Timelines) -> None:
+    def __init__(self, stream: rr.RecordingStream) -> None:
         self._stream = stream
-        self._timelines = timelines
         self._entities: dict[str, str] = {}
         self._rows: defaultdict[str, _Rows] = defaultdict(_Rows)
         self._number = time.time_ns()
+        self.waiting_bytes = 0
+        """Of the payloads that wait for the next flush."""
 
     def add(self, key: str, payload: bytes, moment: Moment | None, arrival_ns: int) -> None:
         """Keep a payload for the next flush, at its place in the run; None: it was refused and has none."""
@@ -49,15 +58,17 @@ class RawStore:
         rows.keys.append(key)
         rows.numbers.append(self._number)
         self._number += 1
+        self.waiting_bytes += len(payload)
 
     def flush(self) -> None:
         """Send all rows that wait."""
-        waiting, self._rows = self._rows, defaultdict(_Rows)
+        waiting, self._rows, self.waiting_bytes = self._rows, defaultdict(_Rows), 0
         for entity, rows in waiting.items():
             self._send(entity, rows)
 
     def _send(self, entity: str, rows: _Rows) -> None:
         arrivals = [moment.wall_ns for moment in rows.moments]
+        checksums = map(checksum, rows.keys, arrivals, rows.numbers, rows.payloads)
         columns = rr.DynamicArchetype.columns(
             ARCHETYPE,
             components={
@@ -65,9 +76,10 @@ class RawStore:
                 "key": pa.array(rows.keys, pa.string()),
                 "arrival_ns": np.array(arrivals, dtype=np.int64),
                 "number": np.array(rows.numbers, dtype=np.uint64),
+                "crc": np.fromiter(checksums, dtype=np.uint32, count=len(arrivals)),
             },
         )
-        times = [wall_column(arrivals)] if entity == REFUSED else self._timelines.columns(rows.moments)
+        times = [wall_column(arrivals)] if entity == REFUSED else step_columns(rows.moments)
         self._stream.send_columns(entity, times, columns)
 
     def _entity(self, key: str) -> str:
