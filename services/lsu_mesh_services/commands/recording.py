@@ -22,10 +22,16 @@ def main(options: argparse.Namespace) -> int:
 def _info(options: argparse.Namespace) -> int:
     from lsu_mesh_services.recording.summary import print_summary, summary
 
-    recording = read_or_explain(Path(options.file))
-    if recording is None:
+    path = Path(options.file)
+    try:
+        found = summary(path)
+    except OSError as error:
+        print(f"{path}: cannot be read: {error.strerror or error}", file=sys.stderr)
         return USAGE
-    print_summary(summary(recording), as_json=options.json)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return USAGE
+    print_summary(found, as_json=options.json)
     return OK
 
 

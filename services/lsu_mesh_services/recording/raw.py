@@ -8,10 +8,12 @@ counts from the nanosecond at which the recorder started, so that a later part o
 
 from __future__ import annotations
 
+import json
 import struct
 import time
 import zlib
 from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +26,7 @@ from lsu_mesh_services.recording.timeline import Moment, step_columns, wall_colu
 
 ARCHETYPE = "lsu.Raw"
 REFUSED = "/raw/refused"
+_TIMES = struct.Struct("<qQ").pack
 
 
 @dataclass
@@ -36,7 +39,25 @@ class _Rows:
 
 def checksum(key: str, arrival_ns: int, number: int, payload: bytes) -> int:
     """CRC-32 of a row: of the payload, after arrival and number (little-endian, 8 bytes each), after the key."""
-    return zlib.crc32(payload, zlib.crc32(struct.pack("<qQ", arrival_ns, number), zlib.crc32(key.encode())))
+    return checksums([key], [arrival_ns], [number], [payload])[0]
+
+
+def checksums(
+    keys: Sequence[str], arrivals: Sequence[int], numbers: Sequence[int], payloads: Sequence[bytes]
+) -> list[int]:
+    """The same of many rows."""
+    of_keys = {key: zlib.crc32(key.encode()) for key in set(keys)}
+    crc = zlib.crc32
+    return [
+        crc(payload, crc(_TIMES(arrival, number), of_keys[key]))
+        for key, arrival, number, payload in zip(keys, arrivals, numbers, payloads, strict=True)
+    ]
+
+
+def description_checksum(described: Mapping[str, str]) -> str:
+    """CRC-32 of what a recording tells of its run, without this checksum itself."""
+    told = sorted((name, value) for name, value in described.items() if value and name != "checksum")
+    return f"{zlib.crc32(json.dumps(told).encode()):08x}"
 
 
 class RawStore:
@@ -68,7 +89,7 @@ class RawStore:
 
     def _send(self, entity: str, rows: _Rows) -> None:
         arrivals = [moment.wall_ns for moment in rows.moments]
-        checksums = map(checksum, rows.keys, arrivals, rows.numbers, rows.payloads)
+        crcs = checksums(rows.keys, arrivals, rows.numbers, rows.payloads)
         columns = rr.DynamicArchetype.columns(
             ARCHETYPE,
             components={
@@ -76,7 +97,7 @@ class RawStore:
                 "key": pa.array(rows.keys, pa.string()),
                 "arrival_ns": np.array(arrivals, dtype=np.int64),
                 "number": np.array(rows.numbers, dtype=np.uint64),
-                "crc": np.fromiter(checksums, dtype=np.uint32, count=len(arrivals)),
+                "crc": np.array(crcs, dtype=np.uint32),
             },
         )
         times = [wall_column(arrivals)] if entity == REFUSED else step_columns(rows.moments)

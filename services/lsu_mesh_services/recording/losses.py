@@ -1,0 +1,71 @@
+"""What is missing in a recording, by the numbers that the recorder gave to what it wrote."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_LOST = 5 * 10**7
+"""A longer gap is no loss: a recorder that was started again counts on from its clock."""
+FOLD_AT = 2**20
+"""Numbers that are collected before they are joined."""
+
+Numbers = NDArray[np.int64]
+
+
+class Loss(NamedTuple):
+    """So many messages in a row are missing, which were recorded between those of two steps."""
+
+    messages: int
+    first_step: int
+    last_step: int
+
+
+class Losses:
+    """Finds the gaps in the numbers of messages, which come in any order, in bounded memory."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[Numbers, Numbers]] = []
+        self._count = 0
+        self._runs: Numbers = np.empty((4, 0), dtype=np.int64)
+        """Per run of numbers the first, the last, and the steps of both."""
+
+    def add(self, numbers: Numbers, steps: Numbers) -> None:
+        """Numbers that are there, and their steps; 0: of none."""
+        self._waiting.append((numbers, steps))
+        self._count += len(numbers)
+        if self._count > FOLD_AT:
+            self._fold()
+
+    def found(self) -> list[Loss]:
+        """What is missing between the numbers that came."""
+        self._fold()
+        first, last, first_step, last_step = self._runs
+        missing = first[1:] - last[:-1] - 1
+        return [
+            Loss(int(missing[i]), min(int(last_step[i]), int(first_step[i + 1])), int(first_step[i + 1]))
+            for i in np.flatnonzero((missing > 0) & (missing < MAX_LOST))
+        ]
+
+    def _fold(self) -> None:
+        if not self._waiting:
+            return
+        numbers, steps = (np.concatenate(parts) for parts in zip(*self._waiting, strict=True))
+        self._waiting, self._count = [], 0
+        runs = np.concatenate([self._runs, np.stack([numbers, numbers, steps, steps])], axis=1)
+        runs = runs[:, np.argsort(runs[0], kind="stable")]
+        first, last, first_step, last_step = runs
+        _fill(first_step)
+        _fill(last_step)
+        reach = np.maximum.accumulate(last)
+        begins = np.flatnonzero(np.concatenate([[True], first[1:] > reach[:-1] + 1]))
+        ends = np.concatenate([begins[1:] - 1, [len(first) - 1]])
+        self._runs = np.stack([first[begins], reach[ends], first_step[begins], last_step[ends]])
+
+
+def _fill(steps: Numbers) -> None:
+    """What is of no step gets that of what came before it."""
+    known = np.where(steps > 0, np.arange(len(steps)), 0)
+    steps[:] = steps[np.maximum.accumulate(known)]
