@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
+from lsu_mesh.array_types import Flags, Integers
 from lsu_mesh_services.recording.container import ARROW, Frame, Hole, batch_of, fields_of, frames, is_about
 from lsu_mesh_services.recording.raw import ARCHETYPE, REFUSED, checksum, checksums
 
@@ -53,6 +53,15 @@ class Damage:
         self.rows += rows
         self._name(path)
 
+    def join(self, other: Damage) -> None:
+        """Add what another one counted."""
+        self.places += other.places
+        self.bytes += other.bytes
+        self.chunks += other.chunks
+        self.rows += other.rows
+        self.cut += other.cut
+        self.files += [name for name in other.files if name not in self.files]
+
     def _name(self, path: Path) -> None:
         if str(path) not in self.files:
             self.files.append(str(path))
@@ -65,8 +74,8 @@ class Rows(NamedTuple):
     keys: Sequence[str]
     arrivals: Sequence[int]
     payloads: Sequence[bytes]
-    numbers: NDArray[np.int64]
-    steps: NDArray[np.int64]
+    numbers: Integers
+    steps: Integers
     """0 where a row is of none."""
     is_checked: bool
     """Whether the rows have checksums, all of which are right."""
@@ -109,7 +118,7 @@ def _rows_of(frame: Frame, path: Path, damage: Damage) -> Rows | None:
     return rows
 
 
-def read_rows(entity: str, batch: pa.RecordBatch) -> tuple[Rows, NDArray[np.bool_]]:
+def read_rows(entity: str, batch: pa.RecordBatch) -> tuple[Rows, Flags]:
     """The rows of a chunk that are what was written, and which ones those are.
 
     Raises ``ValueError`` where a column is missing.
@@ -154,10 +163,10 @@ def _column(batch: pa.RecordBatch, name: str) -> list[Any]:
     return [values[0] if values else None for values in column.to_pylist()]
 
 
-def _steps(batch: pa.RecordBatch) -> NDArray[np.int64]:
+def _steps(batch: pa.RecordBatch) -> Integers:
     if "step" not in batch.schema.names:
         return np.zeros(batch.num_rows, dtype=np.int64)
     column = batch.column("step")
     column = column.fill_null(0) if column.null_count else column
-    steps: NDArray[np.int64] = column.to_numpy(zero_copy_only=False).astype(np.int64)
+    steps: Integers = column.to_numpy(zero_copy_only=False).astype(np.int64)
     return steps

@@ -235,13 +235,27 @@ def batch_of(stream: pa.Buffer) -> tuple[str, pa.RecordBatch]:
         raise ValueError(f"{type(error).__name__}: {error}") from None
 
 
-def with_batch(frame: Frame, batch: pa.RecordBatch) -> Frame:
-    """A message of kind 2 with other rows, not compressed."""
+def new_store(store: bytes) -> Frame:
+    """The message that names a store, for one whose own is damaged: row 0 of Python 3.11, written by this version."""
+    row = b"\x09" + bytes(8) + b"\x11" + bytes(8)
+    source, version = b"\x08\x02\x12\x08\x0a\x06\x08\x03\x10\x0b\x18\x07", b"\x08\x80R"
+    info = b"".join(_field(number, value) for number, value in ((2, store), (5, source), (6, version)))
+    return Frame(0, STORE, _field(1, row) + _field(2, info))
+
+
+def _field(number: int, value: bytes) -> bytes:
+    return _number_bytes(number << 3 | 2) + _number_bytes(len(value)) + value
+
+
+def with_batch(frame: Frame, batch: pa.RecordBatch, store: bytes = b"") -> Frame:
+    """A message of kind 2 with other rows, not compressed, and of another store where one is given."""
     sink = pa.BufferOutputStream()
     with pa.ipc.new_stream(sink, batch.schema) as writer:
         writer.write_batch(batch)
     payload = sink.getvalue().to_pybytes()
     changed: dict[int, int | bytes] = {2: 1, 3: len(payload), 5: payload}
+    if store:
+        changed[1] = store
     body = bytearray()
     for number, wire, old in protobuf(frame.body):
         value = changed.get(number, old)

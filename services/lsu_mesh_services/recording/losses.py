@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from lsu_mesh.array_types import Integers
+from lsu_mesh_services.recording.chunks import Damage
 
 MAX_LOST = 5 * 10**7
 """A longer gap is no loss: a recorder that was started again counts on from its clock."""
 FOLD_AT = 2**20
-"""Numbers that are collected before they are joined."""
-
-Numbers = NDArray[np.int64]
+"""Integers that are collected before they are joined."""
 
 
 class Loss(NamedTuple):
@@ -27,13 +27,13 @@ class Losses:
     """Finds the gaps in the numbers of messages, which come in any order, in bounded memory."""
 
     def __init__(self) -> None:
-        self._waiting: list[tuple[Numbers, Numbers]] = []
+        self._waiting: list[tuple[Integers, Integers]] = []
         self._count = 0
-        self._runs: Numbers = np.empty((4, 0), dtype=np.int64)
+        self._runs: Integers = np.empty((4, 0), dtype=np.int64)
         """Per run of numbers the first, the last, and the steps of both."""
 
-    def add(self, numbers: Numbers, steps: Numbers) -> None:
-        """Numbers that are there, and their steps; 0: of none."""
+    def add(self, numbers: Integers, steps: Integers) -> None:
+        """Integers that are there, and their steps; 0: of none."""
         self._waiting.append((numbers, steps))
         self._count += len(numbers)
         if self._count > FOLD_AT:
@@ -65,7 +65,30 @@ class Losses:
         self._runs = np.stack([first[begins], reach[ends], first_step[begins], last_step[ends]])
 
 
-def _fill(steps: Numbers) -> None:
+def _fill(steps: Integers) -> None:
     """What is of no step gets that of what came before it."""
     known = np.where(steps > 0, np.arange(len(steps)), 0)
     steps[:] = steps[np.maximum.accumulate(known)]
+
+
+def damage_words(damage: Damage, lost: int, losses: list[Loss]) -> list[str]:
+    """What is damaged and what that cost, for people; empty where nothing is."""
+    words = []
+    if damage.cut:
+        words.append(f"cut short: {damage.cut} file(s) end within a message, as after the kill of a recorder")
+    if damage:
+        text = (
+            f"{damage.places} place(s) of {damage.bytes} bytes, {damage.chunks} chunk(s), {damage.rows} single row(s)"
+        )
+        words.append(f"damaged: {text} in {', '.join(damage.files)}")
+    if lost:
+        shown = ", ".join(_loss_words(loss) for loss in losses[:10])
+        words.append(f"lost: {lost} message(s): {shown}{', …' if len(losses) > 10 else ''}")
+    return words
+
+
+def _loss_words(loss: Loss) -> str:
+    between = (
+        f"step {loss.first_step}" if loss.first_step == loss.last_step else f"steps {loss.first_step}–{loss.last_step}"
+    )
+    return f"{loss.messages} of {between}"

@@ -15,6 +15,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -60,6 +61,32 @@ def description_checksum(described: Mapping[str, str]) -> str:
     return f"{zlib.crc32(json.dumps(told).encode()):08x}"
 
 
+def raw_columns(
+    keys: Sequence[str],
+    arrivals: Sequence[int],
+    numbers: Sequence[int],
+    payloads: Sequence[bytes],
+    *,
+    has_checksums: bool = True,
+) -> rr.ComponentColumnList:
+    """Raw rows as columns, with their checksums; without, of a recording that had none."""
+    components: dict[str, Any] = {
+        "payload": pa.array(payloads, pa.binary()),
+        "key": pa.array(keys, pa.string()),
+        "arrival_ns": np.array(arrivals, dtype=np.int64),
+        "number": np.array(numbers, dtype=np.uint64),
+    }
+    if has_checksums:
+        components["crc"] = np.array(checksums(keys, arrivals, numbers, payloads), dtype=np.uint32)
+    return rr.DynamicArchetype.columns(ARCHETYPE, components=components)
+
+
+def entity_of(key: str) -> str:
+    """The entity at which messages of a key lie."""
+    address = parse(key)
+    return REFUSED if address is None else path("raw", address.topic, address.name)
+
+
 class RawStore:
     """Collects raw payloads and sends them in batches."""
 
@@ -89,24 +116,11 @@ class RawStore:
 
     def _send(self, entity: str, rows: _Rows) -> None:
         arrivals = [moment.wall_ns for moment in rows.moments]
-        crcs = checksums(rows.keys, arrivals, rows.numbers, rows.payloads)
-        columns = rr.DynamicArchetype.columns(
-            ARCHETYPE,
-            components={
-                "payload": pa.array(rows.payloads, pa.binary()),
-                "key": pa.array(rows.keys, pa.string()),
-                "arrival_ns": np.array(arrivals, dtype=np.int64),
-                "number": np.array(rows.numbers, dtype=np.uint64),
-                "crc": np.array(crcs, dtype=np.uint32),
-            },
-        )
         times = [wall_column(arrivals)] if entity == REFUSED else step_columns(rows.moments)
-        self._stream.send_columns(entity, times, columns)
+        self._stream.send_columns(entity, times, raw_columns(rows.keys, arrivals, rows.numbers, rows.payloads))
 
     def _entity(self, key: str) -> str:
         entity = self._entities.get(key)
         if entity is None:
-            address = parse(key)
-            entity = REFUSED if address is None else path("raw", address.topic, address.name)
-            self._entities[key] = entity
+            entity = self._entities[key] = entity_of(key)
         return entity

@@ -33,7 +33,7 @@ from lsu_mesh_services.recording.outputs import Outputs
 from lsu_mesh_services.recording.raw import RawStore
 from lsu_mesh_services.recording.sets_3d import Sets3D
 from lsu_mesh_services.recording.status import StatusLanes
-from lsu_mesh_services.recording.stream import open_stream
+from lsu_mesh_services.recording.stream import open_stream, run_description, send_description
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 from lsu_mesh_services.recording.timeout import ends_within
 from lsu_mesh_services.recording.topology import Topology
@@ -106,7 +106,9 @@ class Recorder:
         colors = palette.colors(configuration)
         self.path = path
         self._ledger = Ledger()
-        self._stream = stream = open_stream(names, path, run_properties, serve_port=serve_port, continues=continues)
+        self._described = run_description(configuration) | dict(run_properties)
+        """Written at the beginning and at the end, so that one damaged page does not cost it."""
+        self._stream = stream = open_stream(names, path, self._described, serve_port=serve_port, continues=continues)
         self._raw = RawStore(stream)
         self._estimates = Estimates(stream, timelines, names, colors)
         self._space = Sets3D(stream, timelines, names, colors)
@@ -253,6 +255,7 @@ class Recorder:
 
     def _finish(self) -> None:
         self._guarded("drawing space", self._space.finish)
+        self._guarded("describing the run", lambda: send_description(self._stream, self._described))
         self._store(draws=True)
 
     def _disconnect(self) -> None:

@@ -33,14 +33,14 @@ PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "
 def open_stream(
     names: EntityPaths,
     path: Path,
-    run_properties: Mapping[str, str],
+    described: Mapping[str, str],
     serve_port: int | None = None,
     continues: Path | None = None,
 ) -> rr.RecordingStream:
     """A stream into a new file, and to viewers on ``serve_port`` of the loopback where it is given.
 
-    ``continues`` is an earlier part of the same recording. Raises ``OSError`` where the file exists or cannot be made;
-    a folder that is missing is made.
+    ``described`` tells of the run, ``continues`` is an earlier part of the same recording. Raises ``OSError`` where the
+    file exists or cannot be made; a folder that is missing is made.
     """
     _claim(path)
     rr.set_strict_mode(True)  # an error is an exception, which the recorder counts; else data vanish with a warning
@@ -55,7 +55,7 @@ def open_stream(
         sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=serve_port, server_memory_limit="256MB"))
     stream.set_sinks(*sinks, default_blueprint=blueprint(names))
     stream.send_recording_name(f"{configuration.mesh.name} {path.stem}")
-    send_description(stream, run_description(configuration) | dict(run_properties))
+    send_description(stream, described)
     return stream
 
 

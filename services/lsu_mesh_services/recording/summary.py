@@ -18,7 +18,7 @@ import msgspec
 from lsu_mesh.mesh.admission import Admission, Sequence
 from lsu_mesh.mesh.messages import TYPES
 from lsu_mesh_services.recording.chunks import Damage, Rows, raw_rows
-from lsu_mesh_services.recording.losses import Loss, Losses
+from lsu_mesh_services.recording.losses import Loss, Losses, damage_words
 from lsu_mesh_services.recording.read import check_recording, parts, read_description, recorded_configuration
 
 ABOUT = ("mesh", "seed", "dt", "model_digest", "lsu_mesh", "rerun_sdk", "numba", "python", "cpu", "replay_of")
@@ -229,29 +229,6 @@ class _Counts:
         for key, peer in self._peers.items():
             peer.gaps = gaps[key]
         return sorted(self._peers.values(), key=lambda peer: peer.key)
-
-
-def damage_words(damage: Damage, lost: int, losses: list[Loss]) -> list[str]:
-    """What is damaged and what that cost, for people; empty where nothing is."""
-    words = []
-    if damage.cut:
-        words.append(f"cut short: {damage.cut} file(s) end within a message, as after the kill of a recorder")
-    if damage:
-        text = (
-            f"{damage.places} place(s) of {damage.bytes} bytes, {damage.chunks} chunk(s), {damage.rows} single row(s)"
-        )
-        words.append(f"damaged: {text} in {', '.join(damage.files)}")
-    if lost:
-        shown = ", ".join(_loss_words(loss) for loss in losses[:10])
-        words.append(f"lost: {lost} message(s): {shown}{', …' if len(losses) > 10 else ''}")
-    return words
-
-
-def _loss_words(loss: Loss) -> str:
-    between = (
-        f"step {loss.first_step}" if loss.first_step == loss.last_step else f"steps {loss.first_step}–{loss.last_step}"
-    )
-    return f"{loss.messages} of {between}"
 
 
 def print_summary(found: Summary, *, as_json: bool) -> None:
