@@ -162,7 +162,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh_services.options": [("parsing",), (REST,)],
     "lsu_mesh_services.network": [("access_control",), (REST,)],
     "lsu_mesh_services.recording": [
-        ("entity_paths", "timeline", "palette", "repair", "timeout", "set_geometry", "synthetic_mesh"),
+        ("entity_paths", "timeline", "palette", "container", "timeout", "set_geometry", "synthetic_mesh"),
         ("bands", "raw", "frame"),
         ("read", "blueprint", REST),
         ("stream",),

@@ -81,6 +81,13 @@ class Sequence:
             return True
         return False
 
+    def follow(self, first: int, last: int) -> bool:
+        """Take all numbers from ``first`` to ``last`` at once, if they are the next ones; whether they are."""
+        if first != self._newest + 1:
+            return False
+        self._newest = last
+        return True
+
     def want(self, numbers: Collection[int]) -> None:
         """Numbers that have come and were not used are missing again."""
         self._gaps.update(number for number in numbers if self._newest - WINDOW <= number <= self._newest)

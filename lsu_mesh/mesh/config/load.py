@@ -243,9 +243,10 @@ def _read_recorder(root: Table) -> RecorderSettings:
     flush = table.duration("flush", RecorderSettings.flush, low=0.01)
     mesh_hz = table.number("mesh_hz", RecorderSettings.mesh_hz, above=0.0)
     axes = tuple(table.texts("axes", []))
+    draw_hz = table.number("draw_hz", RecorderSettings.draw_hz, above=0.0)
     predictions = table.flag("predictions", RecorderSettings.predictions)
     table.finish()
-    return RecorderSettings(path, flush, mesh_hz, axes, predictions)
+    return RecorderSettings(path, flush, mesh_hz, axes, draw_hz, predictions)
 
 
 def _read_supervisor(root: Table) -> SupervisorSettings:

@@ -210,9 +210,11 @@ class RecorderSettings:
     """``[recorder]``; ``path`` may hold ``{mesh}`` and ``{time}``."""
 
     path: str = "runs/{mesh}-{time}.rrd"
-    flush: float = 0.2
+    flush: float = 1.0
     mesh_hz: float = 10.0
     axes: tuple[str, ...] = ()
+    draw_hz: float = 10.0
+    """Steps of which numbers are drawn, per second; raw payloads are kept of every step."""
     predictions: bool = False
     """Whether predictions that no filter takes are recorded too, and so computed at all."""
 

@@ -22,10 +22,16 @@ def main(options: argparse.Namespace) -> int:
 def _info(options: argparse.Namespace) -> int:
     from lsu_mesh_services.recording.summary import print_summary, summary
 
-    recording = read_or_explain(Path(options.file))
-    if recording is None:
+    path = Path(options.file)
+    try:
+        found = summary(path)
+    except OSError as error:
+        print(f"{path}: cannot be read: {error.strerror or error}", file=sys.stderr)
         return USAGE
-    print_summary(summary(recording), as_json=options.json)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return USAGE
+    print_summary(found, as_json=options.json)
     return OK
 
 
@@ -51,6 +57,7 @@ def _output(options: argparse.Namespace, file: Path, word: str) -> Path:
 
 
 def _write_repaired(files: list[Path], target: Path, options: argparse.Namespace) -> int:
+    from lsu_mesh_services.recording.losses import damage_words
     from lsu_mesh_services.recording.repair import repair
 
     if target.exists() and not options.force:
@@ -59,7 +66,7 @@ def _write_repaired(files: list[Path], target: Path, options: argparse.Namespace
     before = 0
     try:
         before = sum(file.stat().st_size for file in files)
-        repair(files, target)
+        found = repair(files, target)
     except OSError as error:
         print(f"{error.filename or target}: {error.strerror or error}", file=sys.stderr)
         return USAGE if isinstance(error, FileNotFoundError) else FAILURE
@@ -67,6 +74,9 @@ def _write_repaired(files: list[Path], target: Path, options: argparse.Namespace
         print(error, file=sys.stderr)
         return FAILURE
     after = target.stat().st_size
+    lost = sum(loss.messages for loss in found.losses)
+    for words in damage_words(found.damage, lost, found.losses):
+        print(words, file=sys.stderr)
     print(f"{' + '.join(map(str, files))} → {target}: {before / 1e6:.3g} MB → {after / 1e6:.3g} MB")
     return OK
 

@@ -15,7 +15,7 @@ def add(commands: Commands) -> None:
     info = _new(inner, "info", "what a recording holds: run, peers, messages, gaps, events")
     info.add_argument("file", metavar="FILE.rrd", help="recording; its parts are found beside it")
     info.add_argument("--json", action="store_true", help="one JSON object on stdout")
-    repair = _new(inner, "repair", "write a file that opens, from one that was cut short; it is also smaller")
+    repair = _new(inner, "repair", "write a file that opens, from one that is damaged or cut short")
     repair.add_argument("file", metavar="FILE.rrd", help="recording to repair; it is not changed, unless -o names it")
     _add_output(repair, "FILE.repaired.rrd")
     merge = _new(inner, "merge", "join the parts that a restarted recorder wrote into one recording")

@@ -1,4 +1,7 @@
-"""Truth, bands, errors, widths, volumes and latencies: the numbers of every posterior and fused set, none thinned."""
+"""Truth, bands, errors, widths, volumes and latencies of posteriors and fused sets, at the steps that are drawn.
+
+A set that misses the truth is always drawn.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,7 @@ from lsu_mesh_services.recording.bands import (
 )
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import TRUTH, Color
+from lsu_mesh_services.recording.thinning import Thinning
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
 REMEMBERED = 4096
@@ -39,6 +43,12 @@ class _Row(NamedTuple):
     latency_ms: float
 
 
+class _Waiting(NamedTuple):
+    peer: str
+    row: _Row
+    is_drawn: bool
+
+
 class _Error(NamedTuple):
     moment: Moment
     row: _Row
@@ -55,7 +65,8 @@ class Estimates:
         self._timelines = timelines
         self._names = names
         self._truths: dict[int, list[float]] = {}
-        self._untold: dict[int, list[tuple[str, _Row]]] = {}
+        self._thinning = Thinning(names.configuration)
+        self._untold: dict[int, list[_Waiting]] = {}
         self._truth_rows: list[tuple[Moment, list[float]]] = []
         self._rows: defaultdict[str, list[_Row]] = defaultdict(list)
         self._errors: defaultdict[str, list[_Error]] = defaultdict(list)
@@ -65,10 +76,15 @@ class Estimates:
     def add_truth(self, message: Truth, arrival_ns: int) -> None:
         """The true state of a step; sets of this step that came before it get their errors now."""
         moment = Moment(message.step, arrival_ns)
-        self._truth_rows.append((moment, message.x))
+        if self._thinning.draws("truth", message.step):
+            self._truth_rows.append((moment, message.x))
         _remember(self._truths, message.step, message.x)
-        for peer, row in self._untold.pop(message.step, ()):
-            self._errors[peer].append(_Error(row.moment, row, message.x))
+        for peer, row, is_drawn in self._untold.pop(message.step, ()):
+            if not is_drawn and _misses(row, message.x):
+                self._rows[peer].append(row)
+                is_drawn = True
+            if is_drawn:
+                self._errors[peer].append(_Error(row.moment, row, message.x))
 
     def add(self, message: Posterior, arrival_ns: int) -> None:
         """A posterior or a fused set."""
@@ -83,20 +99,23 @@ class Estimates:
             gain=message.gain,
             latency_ms=latency,
         )
-        self._rows[message.name].append(row)
         truth = self._truths.get(message.step)
-        if truth is not None:
+        is_drawn = self._thinning.draws(message.name, message.step) or (truth is not None and _misses(row, truth))
+        if is_drawn:
+            self._rows[message.name].append(row)
+        if truth is None:
+            waiting = self._untold.get(message.step)
+            if waiting is None:
+                _remember(self._untold, message.step, [_Waiting(message.name, row, is_drawn)])
+            else:
+                waiting.append(_Waiting(message.name, row, is_drawn))
+        elif is_drawn:
             self._errors[message.name].append(_Error(moment, row, truth))
-            return
-        waiting = self._untold.get(message.step)
-        if waiting is None:
-            _remember(self._untold, message.step, [(message.name, row)])
-        else:
-            waiting.append((message.name, row))
 
     def add_smoothed(self, message: Smoothed, arrival_ns: int) -> None:
         """A smoothed set, drawn at the step of its state."""
-        self._smoothed[message.name].append((Moment(message.step, arrival_ns), message))
+        if self._thinning.draws(f"smoothed {message.name}", message.step):
+            self._smoothed[message.name].append((Moment(message.step, arrival_ns), message))
 
     def flush(self) -> None:
         """Send all rows that wait."""
@@ -171,6 +190,10 @@ class Estimates:
 
     def _line(self, entity: str, colors: list[Color], names: list[str]) -> None:
         self._stream.log(entity, rr.SeriesLines(colors=colors, widths=[1.5] * len(names), names=names), static=True)
+
+
+def _misses(row: _Row, truth: list[float]) -> bool:
+    return any(not low <= x <= high for low, x, high in zip(row.lower, truth, row.upper, strict=True))
 
 
 def _series(rows: list[_Row]) -> Array:

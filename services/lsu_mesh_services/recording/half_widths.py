@@ -14,6 +14,7 @@ import rerun as rr
 from lsu_mesh.mesh.messages import Posterior, Suggestion
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import IDENTIFIER, OTHER, Color
+from lsu_mesh_services.recording.thinning import Thinning
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
 POINTS = rr.components.MarkerShape.Diamond
@@ -35,6 +36,7 @@ class HalfWidths:
         self._stream = stream
         self._timelines = timelines
         self._names = names
+        self._thinning = Thinning(names.configuration)
         self._rows: defaultdict[str, list[_Told]] = defaultdict(list)
         self._factors: defaultdict[str, list[tuple[Moment, float]]] = defaultdict(list)
         self.is_drawn = bool(names.learners)
@@ -43,7 +45,8 @@ class HalfWidths:
 
     def add(self, message: Posterior, arrival_ns: int) -> None:
         """The half-widths by which a filter's set was made."""
-        if self.is_drawn and message.name in self._names.configuration.filters:
+        is_filter = message.name in self._names.configuration.filters
+        if self.is_drawn and is_filter and self._thinning.draws(message.name, message.step):
             moment = Moment(message.step, arrival_ns)
             self._rows[message.name].append(_Told(moment, message.bounds.rho, message.bounds.r))
 

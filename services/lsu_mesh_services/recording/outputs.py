@@ -11,6 +11,7 @@ from lsu_mesh.mesh.messages import Measurement, Prediction
 from lsu_mesh_services.recording.bands import band_columns, band_style
 from lsu_mesh_services.recording.entity_paths import EntityPaths, Output
 from lsu_mesh_services.recording.palette import OTHER, Color
+from lsu_mesh_services.recording.thinning import Thinning
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 
 
@@ -23,6 +24,7 @@ class Outputs:
         self._stream = stream
         self._timelines = timelines
         self._names = names
+        self._thinning = Thinning(names.configuration)
         self._start_ns = names.configuration.grid.start_ns
         self._measured: defaultdict[Output, list[tuple[Moment, float]]] = defaultdict(list)
         self._predicted: defaultdict[str, list[tuple[Moment, Prediction]]] = defaultdict(list)
@@ -33,6 +35,8 @@ class Outputs:
 
     def add_measurement(self, message: Measurement, arrival_ns: int) -> None:
         """Measured outputs of one sensor, at their own moment; missing ones leave no point."""
+        if not self._thinning.draws(message.src, message.step):
+            return
         since = None if message.time_error_ns is None else message.time_ns - self._start_ns
         moment = Moment(message.step, arrival_ns, since)
         for output, value in zip(self._of_sensor[message.name], message.y, strict=True):
@@ -41,7 +45,8 @@ class Outputs:
 
     def add_prediction(self, message: Prediction, arrival_ns: int) -> None:
         """Predicted outputs of one filter."""
-        self._predicted[message.name].append((Moment(message.step, arrival_ns), message))
+        if self._thinning.draws(message.src, message.step):
+            self._predicted[message.name].append((Moment(message.step, arrival_ns), message))
 
     def flush(self) -> None:
         """Send all rows that wait."""

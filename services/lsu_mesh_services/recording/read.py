@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 import tomllib
-import warnings
-from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import pyarrow as pa
-from rerun.chunk import RrdReader
 
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load_values
 from lsu_mesh.mesh.messages import TYPES, Message
-from lsu_mesh_services.recording.raw import ARCHETYPE, REFUSED
-from lsu_mesh_services.recording.repair import repair
+from lsu_mesh_services.recording.chunks import Damage, raw_rows
+from lsu_mesh_services.recording.container import ARROW, Frame, batch_of, fields_of, frames, is_about
+from lsu_mesh_services.recording.raw import description_checksum
 
-Found = TypeVar("Found")
 PROPERTIES = "/__properties/lsu_mesh"
 
 
@@ -65,7 +61,9 @@ def read_recording(path: Path) -> Recording:
     Raises ``OSError`` where the file cannot be read, ``ValueError`` where it is no recording of a mesh.
     """
     files = parts(path)
-    description = read_description(files[0])
+    for file in files:
+        check_recording(file)
+    description = read_description(*files)
     configuration = recorded_configuration(path, description)
     admission = Admission(configuration, TYPES)
     received, damaged = [], []
@@ -104,69 +102,58 @@ def recorded_configuration(path: Path, description: dict[str, str]) -> Configura
         raise ValueError(f"{path}: holds no configuration of a mesh that this version can read: {error}") from None
 
 
-def read_description(path: Path) -> dict[str, str]:
-    """What the recorder wrote of the run; empty where it did not."""
+def read_description(*paths: Path) -> dict[str, str]:
+    """What the recorder wrote of the run; empty where it did not, or where every copy of it is damaged.
+
+    The first copy whose checksum is right, of several parts, else the first one.
+    """
+    first: dict[str, str] = {}
+    for path in paths:
+        for frame in frames(path):
+            described = _described(frame) if isinstance(frame, Frame) and frame.kind == ARROW else {}
+            if described and described.get("checksum") in (None, description_checksum(described)):
+                return described
+            first = first or described
+    return first
+
+
+def _described(frame: Frame) -> dict[str, str]:
+    try:
+        stream = fields_of(frame.body).stream()
+        if not is_about(stream, (PROPERTIES.encode(),)):
+            return {}
+        entity, batch = batch_of(stream)
+    except ValueError:
+        return {}
     described: dict[str, str] = {}
-    for batch in _repaired(path, lambda file: _batches(file, PROPERTIES)):
-        for name, column in zip(batch.schema.names, batch.columns, strict=True):
-            values = [] if name.startswith("rerun.") else _flat(column)
-            if values:
-                described[name] = str(values[0])
+    for name, column in zip(batch.schema.names, batch.columns, strict=True):
+        values = [] if name.startswith("rerun.") or not pa.types.is_list(column.type) else column.flatten().to_pylist()
+        if values and entity == PROPERTIES:
+            described[name] = str(values[0])
     return described
 
 
-def read_raw(*paths: Path, refused: bool = False) -> list[RawMessage]:
+def read_raw(*paths: Path, refused: bool = False, damage: Damage | None = None) -> list[RawMessage]:
     """The accepted messages of a recording in the order of arrival; ``refused=True``: all payloads, also those refused.
 
-    Several paths are parts of one recording. Raises ``FileNotFoundError``, or ``ValueError`` where a file is no
-    recording.
+    Several paths are parts of one recording. What is damaged is left out, and told to ``damage``. Raises
+    ``FileNotFoundError``, or ``ValueError`` where a file is no recording.
     """
-    rows = [row for path in paths for row in _repaired(path, lambda file: _read(file, refused))]
+    rows: list[tuple[int, RawMessage]] = []
+    damage = Damage() if damage is None else damage
+    for path in paths:
+        check_recording(path)
+        for found in raw_rows(path, damage):
+            if refused or not found.is_refused:
+                messages = map(RawMessage, found.keys, found.arrivals, found.payloads)
+                rows += zip(found.numbers.tolist(), messages, strict=True)
     rows.sort(key=lambda row: row[0])
     return [message for _, message in rows]
 
 
-def _repaired(path: Path, read: Callable[[Path], list[Found]]) -> list[Found]:
-    """What ``read`` finds; of a file in which a message is cut short, what is whole, from a repaired copy."""
+def check_recording(path: Path) -> None:
+    """Raises ``FileNotFoundError``, or ``ValueError`` where a file holds nothing of a recording."""
     if not path.is_file():
         raise FileNotFoundError(2, "no such recording", str(path))
-    try:
-        return read(path)
-    except RuntimeError:
-        with tempfile.TemporaryDirectory(prefix="read-") as folder:
-            copy = Path(folder) / "repaired.rrd"
-            repair([path], copy)
-            return read(copy)
-
-
-def _batches(path: Path, content: str) -> list[pa.RecordBatch]:
-    return [chunk.to_record_batch() for chunk in _chunks(path, content)]
-
-
-def _read(path: Path, refused: bool) -> list[tuple[int, RawMessage]]:
-    chunks = _chunks(path, "/raw/**")
-    return [
-        row for chunk in chunks if refused or chunk.entity_path != REFUSED for row in _rows(chunk.to_record_batch())
-    ]
-
-
-def _chunks(path: Path, content: str) -> Iterable[Any]:
-    with warnings.catch_warnings():
-        # A recording that is still written, or whose writer was killed, has no footer.
-        warnings.filterwarnings("ignore", message="RRD file has no footer")
-        chunks: Iterable[Any] = RrdReader(path).stream().filter(content=content)
-    return chunks
-
-
-def _rows(batch: pa.RecordBatch) -> list[tuple[int, RawMessage]]:
-    values = {name: _flat(batch.column(f"{ARCHETYPE}:{name}")) for name in ("number", "key", "arrival_ns", "payload")}
-    return [
-        (number, RawMessage(key, arrival, payload))
-        for number, key, arrival, payload in zip(
-            values["number"], values["key"], values["arrival_ns"], values["payload"], strict=True
-        )
-    ]
-
-
-def _flat(column: pa.Array) -> Sequence[Any]:
-    return list(column.flatten().to_pylist())
+    if not any(isinstance(frame, Frame) for frame in frames(path)):
+        raise ValueError(f"{path}: not a Rerun recording, or nothing of it can be read")

@@ -1,6 +1,6 @@
 """Sets in three coordinates: translucent bodies with edges, the true state among them, seen from a frame that follows.
 
-Bodies are thinned, numbers never are: once per ``1 / recorder.mesh_hz`` a step is chosen by the arrival of its first
+Bodies are thinned: once per ``1 / recorder.mesh_hz`` a step is chosen by the arrival of its first
 set, and all sets of that step, and its truth, are drawn. Where drawing takes more than its share of the time, it is
 done less often.
 """
@@ -81,6 +81,7 @@ class Sets3D:
         self._shown: set[str] = set()
         self._estimators = set(names.estimators)
         self._points: list[_Truth] = []
+        self._bodies: defaultdict[str, list[_Drawn]] = defaultdict(list)
         self._frames = {name: frame.Frame(stream, timelines, names, name) for name in (frame.ALL, *names.estimators)}
         self._extents: dict[str, tuple[Array, Array]] = {}
         """Of every peer's last body, (lower, upper)."""
@@ -109,7 +110,12 @@ class Sets3D:
             self._record_truth(Moment(message.step, arrival_ns), message.x)
 
     def flush(self) -> None:
-        """Make and send the bodies of the steps whose sets are all there or have waited long enough."""
+        """Make the bodies that are due, and send all that wait."""
+        self.draw()
+        self._send_all()
+
+    def draw(self) -> None:
+        """Make the bodies of the steps whose sets are all there or have waited long enough; they wait to be sent."""
         ready = [step for step, sets in self._waiting.items() if self._is_complete(sets) or self._has_waited(sets)]
         self._draw(ready)
 
@@ -118,23 +124,26 @@ class Sets3D:
         self.flush()
         if not self._drawn_steps:
             self._draw(list(self._waiting))
+            self._send_all()
 
     def _draw(self, steps: list[int]) -> None:
         began = time.perf_counter_ns()
-        drawn: defaultdict[str, list[_Drawn]] = defaultdict(list)
         for step in sorted(steps):
-            self._draw_step(step, self._waiting.pop(step), drawn)
-        for view in self._frames.values():
-            view.flush()
-        for peer, bodies in drawn.items():
-            self._send(peer, bodies)
-        self._send_points()
+            self._draw_step(step, self._waiting.pop(step), self._bodies)
         failed, self._failed = self._failed, None
         if steps:
             spent = (time.perf_counter_ns() - began) / len(steps)
             self._pause_ns = min(max(self._interval_ns, int(spent / SHARE)), MAX_PAUSE_NS)
         if failed is not None:
             raise failed
+
+    def _send_all(self) -> None:
+        bodies, self._bodies = self._bodies, defaultdict(list)
+        for view in self._frames.values():
+            view.flush()
+        for peer, drawn in bodies.items():
+            self._send(peer, drawn)
+        self._send_points()
 
     def _draw_step(self, step: int, sets: list[_Set], drawn: defaultdict[str, list[_Drawn]]) -> None:
         for one in sorted(sets, key=lambda one: one.peer in self._fusions):  # the common frame sees fusions last

@@ -9,14 +9,11 @@ import json
 import os
 import platform
 import sys
-import tempfile
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
-from rerun.chunk import RrdReader
 
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.fusion.policies import POLICIES
@@ -24,8 +21,9 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.estimation.adoption import filter_algorithm
 from lsu_mesh.mesh.estimation.fusion_step import fusion_algorithm
 from lsu_mesh_services.recording.blueprint import blueprint
+from lsu_mesh_services.recording.container import ARROW, RECORDING, Frame, frames, protobuf, store_of
 from lsu_mesh_services.recording.entity_paths import EntityPaths
-from lsu_mesh_services.recording.repair import repair
+from lsu_mesh_services.recording.raw import description_checksum
 
 MAX_INDEXED_S = 300.0
 """Runs that are longer have no index of their chunks at the end of the file: until then it would grow in memory."""
@@ -35,14 +33,14 @@ PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "
 def open_stream(
     names: EntityPaths,
     path: Path,
-    run_properties: Mapping[str, str],
+    described: Mapping[str, str],
     serve_port: int | None = None,
     continues: Path | None = None,
 ) -> rr.RecordingStream:
     """A stream into a new file, and to viewers on ``serve_port`` of the loopback where it is given.
 
-    ``continues`` is an earlier part of the same recording. Raises ``OSError`` where the file exists or cannot be made;
-    a folder that is missing is made.
+    ``described`` tells of the run, ``continues`` is an earlier part of the same recording. Raises ``OSError`` where the
+    file exists or cannot be made; a folder that is missing is made.
     """
     _claim(path)
     rr.set_strict_mode(True)  # an error is an exception, which the recorder counts; else data vanish with a warning
@@ -57,9 +55,14 @@ def open_stream(
         sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=serve_port, server_memory_limit="256MB"))
     stream.set_sinks(*sinks, default_blueprint=blueprint(names))
     stream.send_recording_name(f"{configuration.mesh.name} {path.stem}")
-    properties: dict[str, Any] = run_description(configuration) | dict(run_properties)
-    stream.send_property("lsu_mesh", rr.AnyValues(**properties))
+    send_description(stream, described)
     return stream
+
+
+def send_description(stream: rr.RecordingStream, described: Mapping[str, str]) -> None:
+    """Write what a reader needs to compute the run again, with a checksum."""
+    properties: dict[str, Any] = {**described, "checksum": description_checksum(described)}
+    stream.send_property("lsu_mesh", rr.AnyValues(**properties))
 
 
 def _is_short(configuration: Configuration) -> bool:
@@ -68,23 +71,16 @@ def _is_short(configuration: Configuration) -> bool:
 
 
 def recording_id(path: Path) -> str | None:
-    """Identifier of the recording in a file, also in one cut short; ``None`` where there is none."""
+    """Identifier of the recording in a file, also in one cut short or damaged; ``None`` where there is none."""
     try:
-        try:
-            return _recording_id(path)
-        except RuntimeError:
-            with tempfile.TemporaryDirectory(prefix="part-") as folder:
-                repair([path], Path(folder) / "repaired.rrd")
-                return _recording_id(Path(folder) / "repaired.rrd")
+        for frame in frames(path):
+            if isinstance(frame, Frame) and frame.kind == ARROW:
+                found = {number: value for number, _, value in protobuf(store_of(frame))}
+                if found.get(1) == RECORDING and isinstance(name := found.get(2), bytes):
+                    return name.decode()
     except (OSError, ValueError):
         return None
-
-
-def _recording_id(path: Path) -> str | None:
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="RRD file has no footer")
-        recordings = RrdReader(path).recordings()
-    return str(recordings[0].recording_id) if recordings else None
+    return None
 
 
 def application_id(configuration: Configuration) -> str:

@@ -46,6 +46,12 @@ class Timelines:
         ]
 
 
+def step_columns(moments: Sequence[Moment]) -> list[rr.TimeColumn]:
+    """The columns of steps and arrivals, without simulated time: for rows that are read and not looked at."""
+    steps = np.array([moment.step for moment in moments], dtype=np.int64)
+    return [rr.TimeColumn(STEP, sequence=steps), wall_column([moment.wall_ns for moment in moments])]
+
+
 def wall_column(wall_ns: Sequence[int]) -> rr.TimeColumn:
     """The column of arrivals alone, for what belongs to no step."""
     return rr.TimeColumn(WALL_TIME, timestamp=np.array(wall_ns, dtype=np.int64).astype("datetime64[ns]"))

@@ -10,7 +10,7 @@ import rerun as rr
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, written
 
-from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.config import Configuration, load
 
 
 @pytest.fixture(autouse=True)
@@ -24,8 +24,8 @@ def strict() -> Iterator[None]:
 
 @pytest.fixture
 def configuration(tmp_path: Path) -> Configuration:
-    """Three states, three filters, one fusion."""
-    return written(tmp_path)
+    """Three states, three filters, one fusion at 50 Hz, of which every step is drawn."""
+    return load(written(tmp_path).path, ["recorder.draw_hz=50"])
 
 
 @pytest.fixture

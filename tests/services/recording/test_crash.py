@@ -18,6 +18,9 @@ from lsu_mesh_services.recording.repair import repair
 from lsu_mesh_services.recording.stream import next_part
 from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh, written
 
+from lsu_mesh.mesh.config import load
+from lsu_mesh.mesh.config.settings import RecorderSettings
+
 WRITER = """
 import sys, time
 from pathlib import Path
@@ -74,7 +77,7 @@ def test_nothing_that_was_flushed_is_lost(flushes: int, tmp_path: Path) -> None:
     assert flushed < recorded, "the recorder was killed between flushes"
     arrivals = [message.arrival_ns for message in messages]
     assert arrivals == sorted(arrivals)
-    gap = 0.2 + 0.3  # the flush interval, and a busy machine
+    gap = RecorderSettings.flush + 0.3  # the flush interval, and a busy machine
     span = (truths[-1].arrival_ns - truths[0].arrival_ns) / len(truths) / 1e9
     assert (recorded - flushed) * span <= gap
 
@@ -115,7 +118,7 @@ def test_parts_are_joined(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def whole_recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("whole")
-    configuration = written(folder, 2, 2)
+    configuration = load(written(folder, 2, 2).path, ["recorder.flush=200ms"])
     recorder = Recorder(configuration, folder / "whole.rrd")
     for arrival in SyntheticMesh(configuration).run(200):
         recorder.record(*arrival)

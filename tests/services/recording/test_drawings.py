@@ -55,7 +55,7 @@ def test_truth_bands_and_errors_are_the_numbers_of_the_messages(
 
 
 def test_smoothed_bands_are_drawn_at_the_step_of_their_state(demo: Path, tmp_path: Path) -> None:
-    mesh = LocalMesh(load(demo, ["mesh.steps=30", "filters.cz.lag=4"]))
+    mesh = LocalMesh(load(demo, ["mesh.steps=30", "filters.cz.lag=4", "recorder.draw_hz=50"]))
     mesh.run(1.0)
     path = recorded(mesh, tmp_path / "smoothed.rrd")
     said = mesh.of(Smoothed, "cz")

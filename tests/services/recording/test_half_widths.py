@@ -22,7 +22,7 @@ STEPS = 60
 @pytest.fixture(scope="module")
 def mesh(root: Path) -> LocalMesh:
     """The example up to its first suggestion, made at step 50."""
-    mesh = LocalMesh(load(root / "examples" / "learning.toml", [f"mesh.steps={STEPS}"]))
+    mesh = LocalMesh(load(root / "examples" / "learning.toml", [f"mesh.steps={STEPS}", "recorder.draw_hz=1000"]))
     mesh.run(1.6)
     return mesh
 
