@@ -127,8 +127,13 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("campaign",),
     ],
     "lsu_mesh.experiments": [
-        ("outcome", "effect", "workers", "transfer_result"),
+        ("outcome", "effect", "workers", "transfer_result", "machine_facts"),
         ("comparison", "monte_carlo", "page"),
+        (REST,),
+    ],
+    "lsu_mesh.experiments.mesh_speed": [
+        ("quantiles", "mesh_case", "bench_kinds", "benchmark_mesh"),
+        ("local_steps", "mesh_report", "bench_file"),
         (REST,),
     ],
     "lsu_mesh_services": [
@@ -141,6 +146,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
         ("ros2",),
         ("mesh_launcher",),
+        ("benchmarks",),
         ("replay",),
         ("commands",),
         ("cli",),
@@ -148,6 +154,14 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh_services.options": [("parsing",), (REST,)],
     "lsu_mesh_services.network": [("access_control",), (REST,)],
+    "lsu_mesh_services.benchmarks": [
+        ("process_group", "process_usage", "keep_results", "table"),
+        ("relay_plan",),
+        ("relay_process",),
+        ("sides",),
+        ("measured_run",),
+        ("turns",),
+    ],
     "lsu_mesh_services.recording": [
         ("entity_paths", "timeline", "palette", "repair", "timeout", "set_geometry", "synthetic_mesh"),
         ("bands", "raw", "frame"),
