@@ -42,6 +42,7 @@ NONE = (
     "reproduce p2006",
     "bench kernels",
     "bench compare a.json b.json",
+    "bench throughput",
     "new m.toml",
 )
 SENSOR = """

@@ -18,6 +18,7 @@ def add(commands: Commands) -> None:
     _add_tightness(inner)
     _add_recording(inner)
     _add_mesh(inner)
+    _add_throughput(inner)
     _add_compare(inner)
 
 
@@ -68,6 +69,13 @@ def _add_mesh(inner: Commands) -> None:
     parser.add_argument(
         "--tree", metavar="DIR", help="measure the mesh of another checkout beside the relay of this one"
     )  # fmt: skip
+    _add_results(parser)
+
+
+def _add_throughput(inner: Commands) -> None:
+    words = "steps a second of one node without a network: decoding, admission, step, encoding; and of its parts"
+    parser = _new(inner, "throughput", words, "bench_throughput", extra=None)
+    parser.add_argument("--quick", action="store_true", help="few steps, one round: a trial, whose numbers mean little")
     _add_results(parser)
 
 

@@ -24,6 +24,12 @@ def test_every_step_ends_in_a_fused_set_that_holds_the_truth(states: int) -> Non
         assert [p.kind for p in posteriors if isinstance(p, Posterior)] == ["LSUO", "LSUP", "LSUCZ", "LSUO"]
 
 
+@pytest.mark.parametrize("rate", [50.0, 30.0, 1000.0 / 7])
+def test_rounding_puts_no_two_steps_into_one(rate: float) -> None:
+    mesh = configuration(rate, 1)
+    assert all(key(NAME, "truth", "plant") in step for step in local_steps(mesh, 300))
+
+
 def test_sizes_are_those_of_the_messages() -> None:
     mesh = configuration(50.0, 2)
     sizes, step = message_sizes(mesh, 20), local_steps(mesh, 20)[-1]
