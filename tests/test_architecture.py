@@ -155,12 +155,14 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh_services.options": [("parsing",), (REST,)],
     "lsu_mesh_services.network": [("access_control",), (REST,)],
     "lsu_mesh_services.benchmarks": [
-        ("process_group", "process_usage", "keep_results", "table"),
+        ("checkout", "process_usage", "keep_results", "table"),
+        ("process_group",),
         ("relay_plan",),
         ("relay_process",),
         ("sides",),
         ("measured_run",),
-        ("turns",),
+        ("turns", "start"),
+        (REST,),
     ],
     "lsu_mesh_services.recording": [
         ("entity_paths", "timeline", "palette", "repair", "timeout", "set_geometry", "synthetic_mesh"),

@@ -21,13 +21,13 @@ NEEDS = (
     (MESH, (
         "run --no-record", "run", "plant", "sensor s1", "filter cz", "fusion main", "identifier x", "router", "list",
         "echo posterior", "hz posterior", "top", "publish gauge", "health", "graph --live", "keys init m.toml",
-        "bench mesh",
+        "bench mesh", "bench start",
     )),
     (RECORD, (
         f"run --record {FILE}", "run --view", "run --web", "recorder", f"view {FILE}", f"replay {FILE}",
         f"replay {FILE} --live", f"replay {FILE} --verify", f"recording info {FILE}", f"recording repair {FILE}",
         f"recording merge {FILE}", f"recording export {FILE} --format parquet", f"identify m.toml --recording {FILE}",
-        "bench recording", "bench mesh --recorder",
+        "bench recording", "bench mesh --recorder", "bench start --recorder",
     )),
     (ROS2, ("import drive.mcap", "bridge ros2")),
     (GATEWAY, ("gateway", "gateway --http 127.0.0.1:0")),

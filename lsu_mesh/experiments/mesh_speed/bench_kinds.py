@@ -33,5 +33,5 @@ KINDS = {
     ),
     "throughput": Kind(("what",), {"per_second": False}),
     "scale": Kind(("what", "count"), {"cost": True}),
-    "start": Kind(("what",), {"rss_mib": True, "seconds": True}),
+    "start": Kind(("what",), {"rss_mib": True, "seconds": True, "processor_s": True}),
 }

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
 
+from lsu_mesh_services.benchmarks.checkout import environment_of
+
 LAST_LINES = 8
 END_S = 8.0
 """How long processes may take to end when asked; a recorder writes its file then."""
@@ -19,12 +21,6 @@ END_S = 8.0
 
 class DidNotRun(Exception):
     """Processes did not start, or ended too early; the message holds their last lines."""
-
-
-def environment_of(tree: Path | None) -> dict[str, str]:
-    """Variables under which Python imports the packages of a checkout; ``None``: those of this process."""
-    paths = {} if tree is None else {"PYTHONPATH": os.pathsep.join([str(tree), str(tree / "services")])}
-    return {**os.environ, "PYTHONSAFEPATH": "1", **paths}
 
 
 class ProcessGroup:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lsu_mesh_services.benchmarks.checkout import DoesNotCompile, compile_kernels, tree_refusal
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
 
 if TYPE_CHECKING:
     from lsu_mesh.experiments.mesh_speed.mesh_case import MeshCase
 
 MIN_SECONDS, MAX_SECONDS, MAX_TURNS = 1.0, 600.0, 100
-PROGRAMS = ("lsu_mesh/__init__.py", "services/lsu_mesh_services/__main__.py")
-"""What a checkout holds."""
 
 
 def main(options: argparse.Namespace) -> int:
@@ -36,8 +34,8 @@ def main(options: argparse.Namespace) -> int:
     tree = None if options.tree is None else Path(options.tree).resolve()
     try:
         compile_kernels(tree)
-    except subprocess.CalledProcessError as error:
-        print(f"bench mesh: the kernels do not compile:\n{error.stderr}", file=sys.stderr)
+    except DoesNotCompile as error:
+        print(f"bench mesh: {error}", file=sys.stderr)
         return COULD_NOT_START
     lines: list[dict[str, Any]] = []
     code = _measure(wanted, options, tree, lines=lines)
@@ -72,19 +70,7 @@ def _refusal(options: argparse.Namespace) -> str:
         return f"--seconds {options.seconds:g}: expected {MIN_SECONDS:g} to {MAX_SECONDS:g}"
     if not 1 <= options.turns <= MAX_TURNS:
         return f"--turns {options.turns}: expected 1 to {MAX_TURNS}"
-    if options.tree is not None:
-        absent = [name for name in PROGRAMS if not (Path(options.tree) / name).is_file()]
-        if absent:
-            return f"--tree {options.tree}: is no checkout of lsu-mesh; there is no {absent[0]}"
-    return ""
-
-
-def compile_kernels(tree: Path | None) -> None:
-    """Compile once, in a process of the tree that is measured, so that its peers only load."""
-    from lsu_mesh_services.benchmarks.process_group import environment_of
-
-    command = [sys.executable, "-P", "-m", "lsu_mesh.filters.warm_up"]
-    subprocess.run(command, env=environment_of(tree), capture_output=True, text=True, check=True)
+    return tree_refusal(options.tree)
 
 
 def _tell(words: str) -> None:

@@ -19,6 +19,7 @@ def add(commands: Commands) -> None:
     _add_recording(inner)
     _add_mesh(inner)
     _add_throughput(inner)
+    _add_start(inner)
     _add_compare(inner)
 
 
@@ -76,6 +77,19 @@ def _add_throughput(inner: Commands) -> None:
     words = "steps a second of one node without a network: decoding, admission, step, encoding; and of its parts"
     parser = _new(inner, "throughput", words, "bench_throughput", extra=None)
     parser.add_argument("--quick", action="store_true", help="few steps, one round: a trial, whose numbers mean little")
+    _add_results(parser)
+
+
+def _add_start(inner: Commands) -> None:
+    words = "time from the start of a mesh to its first fused set, and the memory of each role some seconds later"
+    parser = _new(inner, "start", words, "bench_start", extra=lambda options: RECORD if options.recorder else MESH)
+    parser.add_argument("--recorder", action="store_true", help="with a recorder that listens to everything")
+    parser.add_argument(
+        "--seconds", type=float, default=5.0, metavar="S",
+        help="from the first fused set to the look at the memory (default: 5)",
+    )  # fmt: skip
+    parser.add_argument("--turns", type=int, default=3, metavar="N", help="starts of the mesh (default: 3)")
+    parser.add_argument("--tree", metavar="DIR", help="measure the mesh of another checkout")
     _add_results(parser)
 
 

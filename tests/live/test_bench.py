@@ -1,4 +1,4 @@
-"""``lsu-mesh bench mesh`` with real processes."""
+"""``lsu-mesh bench`` with real processes."""
 
 from __future__ import annotations
 
@@ -31,3 +31,14 @@ def test_a_short_case_beside_its_relay(lsu_mesh_command: list[str], root: Path, 
     file = read_bench_file(target)
     assert (file.what, list(file.cases)) == ("mesh", [line])
     assert str(root) not in target.read_text(encoding="utf-8"), "no path of the machine"
+
+
+def test_a_start_is_timed_and_its_memory_is_read(lsu_mesh_command: list[str]) -> None:
+    command = [*lsu_mesh_command, "bench", "start", "--turns", "1", "--seconds", "0.5", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=250)
+    assert done.returncode == OK, done.stderr
+    lines = {line["what"]: line for line in map(json.loads, done.stdout.splitlines())}
+    assert 0 < lines["all peers linked"]["seconds"] < lines["first fused set"]["seconds"]
+    assert lines["first fused set"]["processor_s"] > 0
+    for role in ("plant", "sensor", "filter", "fusion"):
+        assert 20 < lines[role]["rss_mib"] < 2000
