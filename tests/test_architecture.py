@@ -132,9 +132,11 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         (REST,),
     ],
     "lsu_mesh.experiments.mesh_speed": [
-        ("quantiles", "mesh_case", "bench_kinds", "benchmark_mesh"),
+        ("quantiles", "mesh_case", "bench_kinds", "benchmark_mesh", "growth"),
         ("local_steps", "mesh_report", "bench_file"),
-        (REST,),
+        ("throughput", REST),
+        ("scale",),
+        ("scale_page",),
     ],
     "lsu_mesh_services": [
         ("exit_codes", "extras", "stop", "supervisor", "client"),

@@ -21,7 +21,7 @@ NEEDS = (
     (MESH, (
         "run --no-record", "run", "plant", "sensor s1", "filter cz", "fusion main", "identifier x", "router", "list",
         "echo posterior", "hz posterior", "top", "publish gauge", "health", "graph --live", "keys init m.toml",
-        "bench mesh", "bench start",
+        "bench mesh", "bench start", "bench scale",
     )),
     (RECORD, (
         f"run --record {FILE}", "run --view", "run --web", "recorder", f"view {FILE}", f"replay {FILE}",
@@ -43,6 +43,7 @@ NONE = (
     "bench kernels",
     "bench compare a.json b.json",
     "bench throughput",
+    "bench scale --no-processes",
     "new m.toml",
 )
 SENSOR = """

@@ -20,9 +20,9 @@ from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
 from lsu_mesh_services.viewers import free_port
 
-READY_S = 120.0
-"""How long all processes may take to be there; the kernels are compiled before."""
-LINKS_S = 10.0
+READY_S = 300.0
+"""How long all processes may take to be there, on a machine that is busy; the kernels are compiled before."""
+LINKS_S = 30.0
 """How long to wait for the last links between them when all are there."""
 LEAD_S = 0.3
 """So long after it is told lies the time of step 1."""

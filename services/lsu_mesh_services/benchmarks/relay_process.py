@@ -16,7 +16,7 @@ from lsu_mesh_services.stop import Stop
 STEP_BYTES = 8
 MAX_WAIT = 0.1
 """Seconds between looks at the stop flag, as in a peer."""
-LINKS_S = 20.0
+LINKS_S = 60.0
 """How long to wait for the links to all others."""
 MAX_PENDING = 4096
 """Steps that may be incomplete at once; older ones are forgotten."""

@@ -15,6 +15,8 @@ from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
 if TYPE_CHECKING:
     from lsu_mesh.experiments.mesh_speed.mesh_case import MeshCase
 
+MAX_LOST = 0.01
+"""A side that loses a larger share of its steps does not keep up."""
 MIN_SECONDS, MAX_SECONDS, MAX_TURNS = 1.0, 600.0, 100
 
 
@@ -60,9 +62,22 @@ def _measure(
             print(f"bench mesh, {case.words}: {error}", file=sys.stderr)
             return FAILURE
         lines.append(report.line())
+        if words := too_busy(lines[-1]):
+            print(f"bench mesh, {case.words}: {words}", file=sys.stderr)
         if options.json:
             print(json.dumps(lines[-1]), flush=True)
     return OK
+
+
+def too_busy(line: dict[str, Any]) -> str:
+    """A warning where a side did not keep up with its steps; "" where both did."""
+    lost = {
+        side: line[side]["missing"] for side in ("relay", "mesh") if line[side]["missing"] > MAX_LOST * line["steps"]
+    }
+    if not lost:
+        return ""
+    sides = " and ".join(f"the {side} ({count} of {line['steps']} fused sets missing)" for side, count in lost.items())
+    return f"{sides} did not keep up: the latencies say that the machine is too small or too busy, and nothing else"
 
 
 def _refusal(options: argparse.Namespace) -> str:

@@ -19,6 +19,7 @@ def add(commands: Commands) -> None:
     _add_recording(inner)
     _add_mesh(inner)
     _add_throughput(inner)
+    _add_scale(inner)
     _add_start(inner)
     _add_compare(inner)
 
@@ -77,6 +78,15 @@ def _add_throughput(inner: Commands) -> None:
     words = "steps a second of one node without a network: decoding, admission, step, encoding; and of its parts"
     parser = _new(inner, "throughput", words, "bench_throughput", extra=None)
     parser.add_argument("--quick", action="store_true", help="few steps, one round: a trial, whose numbers mean little")
+    _add_results(parser)
+
+
+def _add_scale(inner: Commands) -> None:
+    words = "cost against the processes of a mesh, sources of a fusion, states of a filter and instances of a bank"
+    parser = _new(inner, "scale", words, "bench_scale", extra=lambda options: None if options.no_processes else MESH)
+    parser.add_argument("--quick", action="store_true", help="few sizes, one round: a trial, whose numbers mean little")
+    parser.add_argument("--no-processes", action="store_true", help="leave out the meshes of real processes")
+    parser.add_argument("--page", metavar="FILE.md", help="write the page with projections, docs/scaling.md")
     _add_results(parser)
 
 

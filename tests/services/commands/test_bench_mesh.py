@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from lsu_mesh_services.cli import main
-from lsu_mesh_services.commands.bench_mesh import print_table
+from lsu_mesh_services.commands.bench_mesh import print_table, too_busy
 from lsu_mesh_services.exit_codes import USAGE
 
 from lsu_mesh.experiments.mesh_speed.mesh_case import MeshCase
@@ -47,3 +47,10 @@ def test_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert ["p99.9", "2", "6", "3"] in lines
     assert ["processor", "a", "step", "2", "10", "5"] in lines
     assert lines[-1][-6:] == ["relay's;", "fused", "sets:", "mesh", "missing", "1"]
+
+
+def test_a_mesh_that_does_not_keep_up_is_told_of() -> None:
+    relay, mesh = Turn([1.0] * 100, 1, 0, 0.004), Turn([1.0] * 100, 1, 0, 0.02)
+    assert too_busy(MeshReport(MeshCase(50.0, 4), [relay], [mesh]).line()) == ""
+    words = too_busy(MeshReport(MeshCase(50.0, 4), [relay], [mesh._replace(missing=2)]).line())
+    assert words.startswith("the mesh (2 of 100 fused sets missing) did not keep up")
