@@ -91,6 +91,8 @@ class ProcessGroup:
         for child in self._children.values():
             if child.poll() is None:
                 child.terminate()
+            if child.stdin is not None and not child.stdin.closed:
+                child.stdin.close()  # one that waits for its line goes on, and ends
         limit = time.monotonic() + END_S
         for child in self._children.values():
             try:
@@ -98,8 +100,6 @@ class ProcessGroup:
             except subprocess.TimeoutExpired:
                 child.kill()
                 child.wait()
-            if child.stdin is not None and not child.stdin.closed:
-                child.stdin.close()
         for output in self._output.values():
             output.close()
         self._children.clear()

@@ -68,7 +68,8 @@ def run(part: RelayPart, entry: str, stop: Stop) -> None:
         bus.declare_alive(part.alive)
         if part.rate:
             line = sys.stdin.readline().strip()
-            _keep_time(part, bus, clock, int(line) if line else 0, stop=stop)
+            if line:  # else the measurement has ended before its first step
+                _keep_time(part, bus, clock, int(line), stop=stop)
         else:
             _pass_on(part, bus, stop)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from pathlib import Path
 
 import psutil
 import pytest
@@ -34,6 +35,20 @@ def test_no_process_outlives_the_group() -> None:
         with pytest.raises(DidNotRun, match=r"held ended with exit code 4\n    told"):
             await_end(group)
     assert not any(psutil.pid_exists(pid) for pid in pids.values())
+
+
+def test_a_process_that_waits_for_its_line_is_told_that_none_comes(tmp_path: Path) -> None:
+    mark, ready = tmp_path / "mark", tmp_path / "ready"
+    program = (
+        "import pathlib, signal, sys; signal.signal(15, lambda *a: None); "
+        f"pathlib.Path({str(ready)!r}).touch(); sys.stdin.readline() or pathlib.Path({str(mark)!r}).touch()"
+    )
+    with ProcessGroup() as group:
+        group.start("waits", ["-c", program], held=True)
+        while not ready.exists():
+            group.check()
+            time.sleep(0.01)
+    assert mark.exists()
 
 
 def test_usage_is_that_of_another_program_that_reads_it() -> None:
