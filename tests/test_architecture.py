@@ -138,9 +138,16 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("campaign",),
     ],
     "lsu_mesh.experiments": [
-        ("outcome", "effect", "workers", "transfer_result"),
+        ("outcome", "effect", "workers", "transfer_result", "machine_facts"),
         ("comparison", "monte_carlo", "page"),
         (REST,),
+    ],
+    "lsu_mesh.experiments.mesh_speed": [
+        ("quantiles", "mesh_case", "bench_kinds", "benchmark_mesh", "growth"),
+        ("local_steps", "mesh_report", "bench_file"),
+        ("throughput", REST),
+        ("scale",),
+        ("scale_page",),
     ],
     "lsu_mesh_services": [
         ("exit_codes", "extras", "stop", "client"),
@@ -154,6 +161,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
         ("ros2",),
         ("mesh_launcher",),
+        ("benchmarks",),
         ("replay",),
         ("commands",),
         ("cli",),
@@ -161,6 +169,16 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     ],
     "lsu_mesh_services.options": [("parsing",), (REST,)],
     "lsu_mesh_services.network": [("access_control",), (REST,)],
+    "lsu_mesh_services.benchmarks": [
+        ("checkout", "process_usage", "keep_results", "table"),
+        ("process_group",),
+        ("relay_plan",),
+        ("relay_process",),
+        ("sides",),
+        ("measured_run",),
+        ("turns", "start"),
+        (REST,),
+    ],
     "lsu_mesh_services.recording": [
         ("entity_paths", "timeline", "palette", "container", "timeout", "set_geometry", "synthetic_mesh"),
         ("bands", "raw", "frame"),

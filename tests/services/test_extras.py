@@ -21,12 +21,13 @@ NEEDS = (
     (MESH, (
         "run --no-record", "run", "plant", "sensor s1", "filter cz", "fusion main", "identifier x", "router", "list",
         "echo posterior", "hz posterior", "top", "publish gauge", "health", "graph --live", "keys init m.toml",
+        "bench mesh", "bench start", "bench scale",
     )),
     (RECORD, (
         f"run --record {FILE}", "run --view", "run --web", "recorder", f"view {FILE}", f"replay {FILE}",
         f"replay {FILE} --live", f"replay {FILE} --verify", f"recording info {FILE}", f"recording repair {FILE}",
         f"recording merge {FILE}", f"recording export {FILE} --format parquet", f"identify m.toml --recording {FILE}",
-        "bench recording",
+        "bench recording", "bench mesh --recorder", "bench start --recorder",
     )),
     (ROS2, ("import drive.mcap", "bridge ros2")),
     (GATEWAY, ("gateway", "gateway --http 127.0.0.1:0")),
@@ -40,6 +41,9 @@ NONE = (
     "graph",
     "reproduce p2006",
     "bench kernels",
+    "bench compare a.json b.json",
+    "bench throughput",
+    "bench scale --no-processes",
     "new m.toml",
 )
 SENSOR = """

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, NamedTuple
 
 from lsu_mesh.experiments.kernel_speed.constrained_steps import (
@@ -18,6 +17,7 @@ from lsu_mesh.experiments.kernel_speed.hulls import HullCost, SafeBounds, hull_c
 from lsu_mesh.experiments.kernel_speed.start import FirstStep, first_step, modules_of_import
 from lsu_mesh.experiments.kernel_speed.steps import BankSpeed, StepCost, bank_speed, step_costs
 from lsu_mesh.experiments.kernel_speed.stopwatch import one_core
+from lsu_mesh.experiments.machine_facts import Facts, processor, releases
 
 PACKAGES = ("numpy", "scipy", "numba", "highspy", "zonoopt", "filterpy")
 JUDGED = 3
@@ -61,7 +61,7 @@ class Demand(NamedTuple):
 class Report(NamedTuple):
     """Everything that was measured."""
 
-    machine: dict[str, str | int | None]
+    machine: Facts
     steps: list[StepCost]
     bank: BankSpeed
     hull: HullCost
@@ -160,21 +160,7 @@ def _at_most(what: str, measured: float | None, limit: float) -> Demand:
     )
 
 
-def _machine(core: int | None) -> dict[str, str | int | None]:
-    versions: dict[str, str | int | None] = {}
-    for package in PACKAGES:
-        try:
-            versions[package] = version(package)
-        except PackageNotFoundError:
-            versions[package] = None
+def _machine(core: int | None) -> Facts:
     return {
-        "processor": _processor(), "cores": os.cpu_count(), "pinned_to": core, "python": platform.python_version()
-    } | versions  # fmt: skip
-
-
-def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or platform.machine()
+        "processor": processor(), "cores": os.cpu_count(), "pinned_to": core, "python": platform.python_version()
+    } | releases(PACKAGES)  # fmt: skip

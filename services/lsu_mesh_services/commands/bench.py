@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lsu_mesh_services.benchmarks.table import new_console, print_rows
 from lsu_mesh_services.exit_codes import COULD_NOT_START, OK
 
 if TYPE_CHECKING:
@@ -16,18 +17,8 @@ if TYPE_CHECKING:
 
     from lsu_mesh.experiments.kernel_speed.report import Demand, Report
 
-Cells = Sequence[str]
-
 
 def main(options: argparse.Namespace) -> int:
-    if options.what == "tightness":
-        from lsu_mesh_services.commands import tightness
-
-        return tightness.main(options)
-    if options.what == "recording":
-        from lsu_mesh_services.commands import recording_cost
-
-        return recording_cost.main(options)
     from lsu_mesh.experiments.kernel_speed import figures, report
 
     if options.out is not None and not _can_draw():
@@ -58,27 +49,13 @@ def _tell(words: str) -> None:
 
 def print_tables(report: Report, growth: dict[str, float]) -> None:
     """Everything for people, on stdout."""
-    from rich.console import Console
-
-    console = Console(width=None if sys.stdout.isatty() else 120, highlight=False)
+    console = new_console()
     named = [f"{name} {value}" for name, value in report.machine.items() if value is not None]
     console.print(", ".join(named), markup=False, soft_wrap=True)
     _print_steps(console, report)
     _print_others(console, report)
     _print_growth(console, report, growth)
     _print_demands(console, report.demands)
-
-
-def _print(console: Console, title: str, heads: Cells, rows: Sequence[Cells]) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for k, head in enumerate(heads):
-        table.add_column(head, justify="left" if k == 0 else "right", no_wrap=True)
-    for row in rows:
-        table.add_row(*row)
-    console.print(f"\n{title}", markup=False)
-    console.print(table)
 
 
 def _print_steps(console: Console, report: Report) -> None:
@@ -100,7 +77,7 @@ def _print_steps(console: Console, report: Report) -> None:
         )
         for cost in report.steps
     ]  # fmt: skip
-    _print(console, "One step: output prediction, update, bounds, prediction", heads, rows)
+    print_rows(console, "One step: output prediction, update, bounds, prediction", heads, rows)
 
 
 def _print_others(console: Console, report: Report) -> None:
@@ -110,7 +87,7 @@ def _print_others(console: Console, report: Report) -> None:
         for name, seconds in hull.seconds.items()
     ]
     heads = ("solver", "one hull", "÷ own", "largest difference")
-    _print(console, "Hull of 20 generators, 8 constraints, dimension 3", heads, rows)
+    print_rows(console, "Hull of 20 generators, 8 constraints, dimension 3", heads, rows)
     console.print(
         f"safe bounds: {report.safe_bounds.share:.1%} of a hull's time, "
         f"relative loss at most {report.safe_bounds.loss:.1e}"
@@ -118,7 +95,7 @@ def _print_others(console: Console, report: Report) -> None:
     rows = [("own", _time(step.own), "1", "1")]
     if step.zonoopt is not None:
         rows.append(("zonoopt", _time(step.zonoopt), _ratio(step.zonoopt, step.own), f"{step.width_ratio:.3f}"))
-    _print(console, "Step of LSUCZ(20, 8) on P3 with hull", ("", "one step", "÷ own", "width ÷ own"), rows)
+    print_rows(console, "Step of LSUCZ(20, 8) on P3 with hull", ("", "one step", "÷ own", "width ÷ own"), rows)
     bank = report.bank
     console.print(f"\nbank of {bank.instances} LSUO on P3: {bank.steps_per_second:,.0f} steps a second on one core")
     console.print(f"import lsu_mesh loads of zenoh, rerun, msgspec: {', '.join(report.imported) or 'none'}")
@@ -133,7 +110,7 @@ def _print_growth(console: Console, report: Report, growth: dict[str, float]) ->
     rows = [
         (str(cost.generators), str(cost.constraints), _time(cost.hull), _time(cost.step)) for cost in report.generators
     ]
-    _print(
+    print_rows(
         console,
         "Cost against generators, dimension 3",
         ("generators", "constraints", "hull", "LSUCZ step"),
@@ -153,7 +130,7 @@ def _print_demands(console: Console, demands: Sequence[Demand]) -> None:
         )
         for demand in demands
     ]
-    _print(console, "Demanded", ("", "measured", "demanded", ""), rows)
+    print_rows(console, "Demanded", ("", "measured", "demanded", ""), rows)
 
 
 def _time(seconds: float | None) -> str:
