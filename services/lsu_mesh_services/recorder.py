@@ -15,6 +15,7 @@ from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DuplicateProcess
 from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
+from lsu_mesh.mesh.lost_messages import LostMessages
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
@@ -117,7 +118,10 @@ class RecorderService:
         self._clock = clock
         self._mesh = configuration.mesh.name
         self._admission = Admission(configuration, TYPES)
-        self._recovery = GapRecovery(self._admission, bus.ask_cache)
+        kept_ns = self._admission.kept_ns
+        self._recovery = GapRecovery(bus.arrivals, bus.ask_cache, self._admission.is_cached, kept_ns)
+        bus.watch_numbers()  # without a bound on age: a recording wants all that it can get
+        self._lost, self._copies = LostMessages(), 0
         self._boot = secrets.token_hex(8)
         self._started_ns, self._host = clock.now(), socket.gethostname()
         self._sequence = 0
@@ -148,7 +152,12 @@ class RecorderService:
         began, self._queue = self._clock.now(), max(self._queue, self._bus.waiting())
         taken = self._take_all(MAX_AT_ONCE)
         now = self._clock.now()
-        self._recovery.check(now, self._bus.waiting())
+        losses = self._recovery.check(now)
+        self._lost.record(losses, now)
+        for loss in losses:
+            self._admission.expect(loss.key, loss.boot, loss.first, loss.last)
+        self._admission.duplicates += self._bus.copies - self._copies
+        self._copies = self._bus.copies
         self._recorder.tick(now)
         self._start.check(self._bus, now)
         links = self._bus.links()
@@ -205,8 +214,10 @@ class RecorderService:
         if self._other_process.take_news(now) is not None:
             print(f"{ROLE_NAME}: {twice}", file=sys.stderr)
         problems += [complaint.text for complaint in self._source_timeouts.complaints(now)]
-        if self._bus.dropped:
-            problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
+        if (given_up := self._lost.take_news(now)) is not None:
+            print(f"{ROLE_NAME}: {given_up[0]}", file=sys.stderr)
+        if self._lost.count:
+            problems.append(f"{self._lost.count} message(s) are not in the recording, last: {self._lost.last}")
         counters = self._admission.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}
         counters |= {"links": float(self._links), "step_ms": self._longest_ns * 1e-6}
         self._queue = self._longest_ns = 0

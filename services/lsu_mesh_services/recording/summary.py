@@ -8,8 +8,8 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 
-from lsu_mesh.mesh.admission import Sequence
 from lsu_mesh.mesh.messages import Event, Posterior
+from lsu_mesh.mesh.sequences import Sequence
 from lsu_mesh_services.recording.read import Recording, read_raw
 
 ABOUT = ("mesh", "seed", "dt", "model_digest", "lsu_mesh", "rerun_sdk", "numba", "python", "cpu", "replay_of")
