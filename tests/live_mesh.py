@@ -18,7 +18,6 @@ import psutil
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.commands.keys import make_files
 from lsu_mesh_services.network.certificate_authority import LOOPBACK_HOSTS
-from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.security import certificates
 from lsu_mesh_services.supervisor import Child, Supervisor
 from ports import free_port
@@ -202,11 +201,10 @@ class LiveMesh:
 
     def _observe(self) -> None:
         admission = self.observer.admission
-        self._bus.watch_numbers()
-        recovery = GapRecovery(self._bus.arrivals, self._bus.ask_cache, admission.is_cached, admission.kept_ns)
+        self._bus.recover(admission.is_cached, admission.kept_ns)
         try:
             while not self._ending.is_set():
-                for loss in recovery.check(self.clock.now()):
+                for loss in self._bus.arrivals.take_losses():
                     admission.expect(loss.key, loss.boot, loss.first, loss.last)
                 arrival = self._bus.next(0.1)
                 if arrival is not None:

@@ -6,6 +6,7 @@ received or given up exactly that, and have said so; what it gave up must have w
 
 from __future__ import annotations
 
+import math
 import os
 import statistics
 import struct
@@ -19,7 +20,6 @@ from pathlib import Path
 import psutil
 from live_mesh import LiveMesh, Observer, Seen, TrueStates, holds
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
-from lsu_mesh_services.network.gap_recovery import GapRecovery
 
 from lsu_mesh.mesh.access import subscriptions
 from lsu_mesh.mesh.admission import Admission
@@ -33,6 +33,7 @@ MAX_GROWTH = 0.02
 MAX_MIB = 4.0
 MAX_CURRENT_S = 2.0
 """From the end of the load until all have done all that there is."""
+MAX_WAIT_S = 60.0
 SETTLE_S = 20.0
 """Until what is missing has come or is given up."""
 CHECKED = ("sensor", "filter", "fusion")
@@ -229,7 +230,10 @@ def _until_current(mesh: LiveMesh, observer: Counting) -> float:
     """Seconds until every estimator has published the last step but one, or later."""
     began = time.monotonic()
     last = observer.newest_number[key(mesh.configuration.mesh.name, "truth", "plant")] + 1
-    mesh.until(lambda: min(step for _, step in observer.newest_estimates().values()) >= last - 1, "all are current", 60)
+    while min(step for _, step in observer.newest_estimates().values()) < last - 1:
+        if time.monotonic() - began > MAX_WAIT_S:
+            return math.inf
+        time.sleep(0.01)
     return time.monotonic() - began
 
 
@@ -259,7 +263,7 @@ class SlowReader(threading.Thread):
         self._lost: list[tuple[str, int]] = []
         self._is_over = threading.Event()
         self._hurries = 0.0
-        self.current_s = float("inf")
+        self.current_s = math.inf
         self.longest_s, self.too_old = 0.0, 0
         self.start()
 
@@ -271,20 +275,19 @@ class SlowReader(threading.Thread):
         clock, entry = Clock(), self._mesh.configuration.network.entry
         settings = SessionSettings((entry,), (), mode="client", cache=self._mesh.configuration.cached)
         with Bus(settings, clock) as bus:
-            bus.watch_numbers()
             kept_ns = self._admission.kept_ns
             assert kept_ns is not None
             bus.bound_age(kept_ns, lambda _: False)
-            recovery = GapRecovery(bus.arrivals, bus.ask_cache, self._admission.is_cached, kept_ns)
+            bus.recover(self._admission.is_cached, kept_ns)
             for topic in ("posterior", "fused"):
                 bus.subscribe(f"{PREFIX}/{self._mesh.configuration.mesh.name}/{topic}/*")
             while not self._is_over.is_set():
-                for loss in recovery.check(clock.now()):
+                for loss in bus.arrivals.take_losses():
                     self._admission.expect(loss.key, loss.boot, loss.first, loss.last)
                     self._lost += [(loss.key, seq) for seq in range(loss.first, loss.last + 1)]
                 arrival = bus.next(0.05)
                 if arrival is None:
-                    if self._hurries and self.current_s == float("inf"):
+                    if self._hurries and self.current_s == math.inf:
                         self.current_s = max(0.0, time.monotonic() - self._hurries)
                     continue
                 self.longest_s = max(self.longest_s, (clock.now() - arrival.arrival_ns) * 1e-9)

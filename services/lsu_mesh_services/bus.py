@@ -19,6 +19,7 @@ from zenoh import ext
 
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh.mesh.sequences import Head, read_head
+from lsu_mesh_services.network.gap_recovery import GapRecovery, RecoveryThread
 from lsu_mesh_services.network.link_repair import LinkRepair
 from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
 from lsu_mesh_services.network.security import Certificates
@@ -73,6 +74,7 @@ class Bus:
         self._watches_numbers = False
         self._offsets: dict[str, int] = {}
         """By key: by how much Zenoh's number of a message is larger than its own."""
+        self._recovery: RecoveryThread | None = None
         self._reunion: LinkRepair | None = None
         try:
             self._session = zenoh.open(_zenoh_configuration(settings))
@@ -141,9 +143,15 @@ class Bus:
         """Note from now on the numbers of messages when they come: copies are dropped, gaps and losses known."""
         self._watches_numbers = True
 
-    def bound_age(self, max_age_ns: int, spares: Callable[[str], bool]) -> None:
-        """Let no message wait for longer; where that is exceeded, only those whose key is spared for so long."""
-        self._arrivals.bound_age(max_age_ns, self._clock.now, spares)
+    def recover(self, is_cached: Callable[[str], bool], kept_ns: int | None) -> None:
+        """Watch numbers, and ask the caches of publishers, which keep messages for so long, for what is missed."""
+        self.watch_numbers()
+        recovery = GapRecovery(self._arrivals, self.ask_cache, is_cached, kept_ns)
+        self._recovery = RecoveryThread(recovery, self._arrivals, self._clock.now)
+
+    def bound_age(self, max_age_ns: int, spares: Callable[[str], bool], max_spared_ns: int | None = None) -> None:
+        """Let no message wait for longer; those whose key is spared may for ``max_spared_ns`` (None: for ever)."""
+        self._arrivals.bound_age(max_age_ns, self._clock.now, spares, max_spared_ns=max_spared_ns)
 
     @property
     def arrivals(self) -> ReceiveQueue:
@@ -310,6 +318,8 @@ class Bus:
 
     def close(self) -> None:
         """Undeclare everything and close; errors of a lost link do not matter any more."""
+        if self._recovery is not None:
+            self._recovery.close()
         if self._reunion is not None:
             self._reunion.close()
         for declared in [*reversed(self._declared), *self._publishers.values()]:

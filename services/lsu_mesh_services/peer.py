@@ -22,7 +22,6 @@ from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.mesh_start import MeshStart, moment_text
-from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.processor_need import ProcessorNeed, Reading
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.session import connection_report
@@ -127,10 +126,10 @@ class Peer:
         self._turned_at, self._settled_at = clock.now(), 0
         self._measured_until = self._worst_queue = self._worst_ns = self._worst_age_ns = 0
         kept_ns = node.admission.kept_ns
-        self._recovery = GapRecovery(bus.arrivals, bus.ask_cache, node.admission.is_cached, kept_ns)
-        bus.watch_numbers()
+        bus.recover(node.admission.is_cached, kept_ns)
         if kept_ns is not None:
-            bus.bound_age(kept_ns, lambda address: f"/{SPARED}/" in address)
+            max_spared_ns = None if node.needs_all_inputs else kept_ns
+            bus.bound_age(kept_ns, lambda address: f"/{SPARED}/" in address, max_spared_ns)
         node.admission.wanted_again = self._want_again
         self._waited_ns = 0
         self._need = ProcessorNeed(self._reading())
@@ -187,7 +186,7 @@ class Peer:
         self._watch_links()
         self._start.check(self._bus, self._clock.now())
         self._look_for_standstill(self._clock.now())
-        self._node.record_lost(self._recovery.check(self._clock.now()), self._clock.now())
+        self._node.record_lost(self._bus.arrivals.take_losses(), self._clock.now())
         waits_since = self._clock.now()
         arrival = self._bus.next(self._patience())
         self._waited_ns += self._clock.now() - waits_since

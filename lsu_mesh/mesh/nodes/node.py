@@ -72,6 +72,8 @@ class Node(ABC):
     """Messages that the service around the node hands over before the next tick, however many more are waiting."""
     messages_per_step: int = 1
     """Messages of a step under one key at most, as far as the node knows."""
+    needs_all_inputs: bool = False
+    """Whether it can never continue behind an input that it did not get."""
     answers: ClassVar[tuple[str, ...]] = ()
     """Topics that come as answers to the node's queries, besides its subscriptions."""
 

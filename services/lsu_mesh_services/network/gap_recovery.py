@@ -7,6 +7,7 @@ the missing numbers are asked for, as few ranges, until they have come or their 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -22,6 +23,8 @@ MAX_QUESTIONS = 8
 """For a stream at one look; ranges that lie close together are asked for as one."""
 GRACE_NS = SECOND_NS
 """What is asked for when its publisher is about to forget it may still be on its way."""
+PAUSE_S, STANDSTILL_NS = 0.1, SECOND_NS
+"""Between two turns of the thread; one that had to wait for so long could not ask."""
 WHOLE_CACHE = 4
 """At each so-many-th try the whole cache is asked for, in case its publisher counts otherwise."""
 Span = tuple[int, int]
@@ -88,6 +91,30 @@ class GapRecovery:
             for span in [None] if is_whole else joined(ranges, MAX_QUESTIONS):
                 self.asked += 1
                 self._ask(stream[0], span)
+
+
+class RecoveryThread:
+    """Looks for gaps in a thread of its own: a peer that takes long over its messages asks in time all the same."""
+
+    def __init__(self, recovery: GapRecovery, queue: ReceiveQueue, clock: Callable[[], int]) -> None:
+        self._recovery, self._queue, self._clock = recovery, queue, clock
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="recovery", daemon=True)
+        self._thread.start()
+
+    def close(self, patience: float = 2.0) -> None:
+        """End it before the session."""
+        self._is_over.set()
+        self._thread.join(patience)
+
+    def _run(self) -> None:
+        before = self._clock()
+        while not self._is_over.wait(PAUSE_S):
+            now = self._clock()
+            if now - before > STANDSTILL_NS:
+                self._queue.excuse_gaps(now)
+            before = now
+            self._queue.lose(self._recovery.check(now))
 
 
 def joined(ranges: list[Span], most: int) -> list[Span]:

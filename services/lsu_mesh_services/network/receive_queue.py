@@ -47,6 +47,7 @@ class ReceiveQueue:
         self._now: Callable[[], int] | None = None
         self._max_age_ns = 0
         self._spares: Callable[[str], bool] = lambda _: False
+        self._max_spared_ns: int | None = 0
         self._excused_until = self._next_skip = 0
         self._lost: list[Loss] = []
         self.is_late = False
@@ -59,10 +60,15 @@ class ReceiveQueue:
         """Arrivals that were handed over."""
 
     def bound_age(
-        self, max_age_ns: int, now: Callable[[], int], spares: Callable[[str], bool] = lambda _: False
+        self,
+        max_age_ns: int,
+        now: Callable[[], int],
+        spares: Callable[[str], bool] = lambda _: False,
+        *,
+        max_spared_ns: int | None = None,
     ) -> None:
-        """Let no message wait for longer; where the peer is late only those whose key is spared for so long."""
-        self._max_age_ns, self._now, self._spares = max_age_ns, now, spares
+        """Let no message wait for longer; those whose key is spared may for ``max_spared_ns`` (None: for ever)."""
+        self._max_age_ns, self._now, self._spares, self._max_spared_ns = max_age_ns, now, spares, max_spared_ns
 
     # -- from the network
 
@@ -134,15 +140,14 @@ class ReceiveQueue:
     def _skip_ahead(self, now: int) -> None:
         """Give up what waits behind the present, where the oldest has waited for too long."""
         limit = MAX_LATE_NS if self.is_late else self._max_age_ns
-        oldest = self._age(self._waiting[0][0], now)
-        if oldest <= limit or (now < self._next_skip and oldest <= self._max_age_ns):
+        if now < self._next_skip or self._age(self._waiting[0][0], now) <= limit:
             return
         self.is_late, self._next_skip = True, now + PRESENT_NS
         kept: deque[tuple[Arrival, Number | None]] = deque()
         lost: list[Number] = []
         for arrival, number in self._waiting:
-            most = self._max_age_ns if self._spares(arrival.key) else PRESENT_NS
-            if not arrival.payload or self._age(arrival, now) <= min(most, self._max_age_ns):
+            most = self._max_spared_ns if self._spares(arrival.key) else PRESENT_NS
+            if not arrival.payload or most is None or self._age(arrival, now) <= most:
                 kept.append((arrival, number))
                 continue
             self._bytes -= len(arrival.payload)
@@ -165,7 +170,7 @@ class ReceiveQueue:
             self._numbers.excuse(now)
 
     def take_losses(self) -> list[Loss]:
-        """What has been given up since the last call, because it waited for too long."""
+        """What has been given up since the last call."""
         with self._changed:
             lost, self._lost = self._lost, []
             return lost
@@ -176,6 +181,16 @@ class ReceiveQueue:
         """Gaps that are not closed, each with the ranges that are missing of it."""
         with self._changed:
             return self._numbers.gaps()
+
+    def excuse_gaps(self, now: int) -> None:
+        """Nobody could ask: what was missed before counts from now on."""
+        with self._changed:
+            self._numbers.excuse(now)
+
+    def lose(self, losses: Iterable[Loss]) -> None:
+        """What has been given up, for :meth:`take_losses`."""
+        with self._changed:
+            self._lost += losses
 
     def give_up(self, gaps: Iterable[Gap]) -> None:
         """Ask for these no more."""

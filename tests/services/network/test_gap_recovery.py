@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from lsu_mesh_services.network.gap_recovery import (
     SECOND_NS,
     WHOLE_CACHE,
     GapRecovery,
+    RecoveryThread,
     joined,
 )
 from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
@@ -155,6 +157,23 @@ def test_what_a_second_process_sent_and_was_refused_is_asked_for_again() -> None
     assert asked == [(INPUT, (4, 6))]
     came(queue, 5)
     assert queue.copies == 0
+
+
+def test_a_thread_asks_and_gives_up_however_long_the_peer_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lsu_mesh_services.network.gap_recovery.PAUSE_S", 0.001)
+    queue = ReceiveQueue()
+    recovery, asked = recovery_of(queue)
+    came(queue, 0, 5)
+    times = itertools.count(0, LOOK_NS)
+    thread = RecoveryThread(recovery, queue, times.__next__)
+    end = time.monotonic() + 10.0
+    losses: list[Loss] = []
+    while not losses and time.monotonic() < end:
+        time.sleep(0.005)
+        losses = queue.take_losses()
+    thread.close()
+    assert losses == [Loss(INPUT, BOOT, 1, 4, False)]
+    assert len(asked) == MAX_TRIES + 1
 
 
 @pytest.mark.live

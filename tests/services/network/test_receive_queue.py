@@ -79,10 +79,12 @@ def test_an_answer_drives_nothing_out_of_a_full_queue() -> None:
     ]  # fmt: skip
 
 
-def aged(ages: dict[str, list[float]], bound_s: float = 6.0) -> ReceiveQueue:
+def aged(ages: dict[str, list[float]], spared_s: float | None = 6.0) -> ReceiveQueue:
     """A queue at the time of 100 s with samples of so many seconds, by key; inputs are spared."""
     arrivals = ReceiveQueue()
-    arrivals.bound_age(int(bound_s * SECOND_NS), lambda: 100 * SECOND_NS, lambda key: key == "input")
+    spared_ns = None if spared_s is None else int(spared_s * SECOND_NS)
+    is_input = "input".__eq__
+    arrivals.bound_age(6 * SECOND_NS, lambda: 100 * SECOND_NS, is_input, max_spared_ns=spared_ns)
     samples = sorted((100 - age, key, seq) for key, those in ages.items() for seq, age in enumerate(those))
     for at, key, seq in samples:
         arrivals.put(Arrival("sample", key, b"x", int(at * SECOND_NS)), Head(BOOT, seq, seq))
@@ -100,6 +102,12 @@ def test_a_queue_whose_oldest_is_too_old_gives_up_all_behind_the_present_but_inp
     assert sorted(arrivals.take_losses()) == [Loss("data", BOOT, 0, 2, True), Loss("input", BOOT, 0, 0, True)]
     assert (arrivals.too_old, arrivals.dropped, arrivals.take_losses(), arrivals.gaps()) == (4, 0, [], [])
     assert not arrivals.is_late, "the queue was empty once"
+
+
+def test_inputs_of_a_peer_that_cannot_do_without_them_are_never_too_old() -> None:
+    arrivals = aged({"data": [30.0, 5.0, 0.2], "input": [31.0, 7.0, 0.1]}, spared_s=None)
+    assert [one.key for one in taken(arrivals)] == ["input", "input", "data", "input"]
+    assert arrivals.take_losses() == [Loss("data", BOOT, 0, 1, True)]
 
 
 def test_a_queue_within_its_bound_gives_up_nothing() -> None:
