@@ -18,7 +18,6 @@ import psutil
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.commands.keys import make_files
 from lsu_mesh_services.network.certificate_authority import LOOPBACK_HOSTS
-from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.security import certificates
 from lsu_mesh_services.supervisor import Child, Supervisor
 from ports import free_port
@@ -201,10 +200,12 @@ class LiveMesh:
         return [*arguments, "-m", "client", "-e", f"tls/127.0.0.1:{proxy.port}"]
 
     def _observe(self) -> None:
-        recovery = GapRecovery(self.observer.admission, self._bus.ask_cache)
+        admission = self.observer.admission
+        self._bus.recover(admission.is_cached, admission.kept_ns)
         try:
             while not self._ending.is_set():
-                recovery.check(self.clock.now())
+                for loss in self._bus.arrivals.take_losses():
+                    admission.expect(loss.key, loss.boot, loss.first, loss.last)
                 arrival = self._bus.next(0.1)
                 if arrival is not None:
                     self.observer.take(arrival.what, arrival.key, arrival.payload, arrival.arrival_ns)
@@ -295,12 +296,9 @@ class LiveMesh:
         return topic == "health" or message.step >= self.due(arrival_ns) - self.steps(SLACK_S)
 
     def gaps(self) -> dict[str, float]:
-        """Messages that are known to be missing now, by peer, with the observer's own."""
+        """Messages that are known to be missing now, by peer, with the observer's own; dropped ones are among them."""
         counted = {name: health[-1][1].counters.get("gaps", 0.0) for name, health in self.observer.health.items()}
-        dropped = {name: health[-1][1].counters.get("dropped", 0.0) for name, health in self.observer.health.items()}
-        return {name: counted[name] + dropped[name] for name in counted} | {
-            "observer": float(self.observer.admission.gaps)
-        }
+        return counted | {"observer": float(self.observer.admission.gaps)}
 
     def containment(self, since_ns: int = 0) -> tuple[int, int]:
         """How many estimates hold the truth, and how many there are."""

@@ -89,7 +89,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.fusion": [("point", "stack"), ("intersection",), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
-        ("message_examples", "sets", "data_files", "ros2", "json_form"),
+        ("message_examples", "sets", "data_files", "ros2", "json_form", "sequences", "lost_messages"),
         ("config",),
         (
             "access",

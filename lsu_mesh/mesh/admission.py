@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Collection
 
 from lsu_mesh.fusion.policies import POLICIES
-from lsu_mesh.mesh.config.settings import Configuration
+from lsu_mesh.mesh.config.settings import CACHED_SECONDS, Configuration
 from lsu_mesh.mesh.duplicate_publishers import DuplicatePublishers
 from lsu_mesh.mesh.input_time import check_beginning
 from lsu_mesh.mesh.keys import parse
@@ -29,6 +29,7 @@ from lsu_mesh.mesh.messages import (
     Truth,
     read,
 )
+from lsu_mesh.mesh.sequences import Sequence
 
 ROLE_OF_TOPIC = {
     "truth": "plant",
@@ -40,62 +41,11 @@ ROLE_OF_TOPIC = {
     "fused": "fusion",
     "bounds": "identifier",
 }
-WINDOW = 4096
-"""How far back in a sequence a message may come late and still be told from a copy."""
 MAX_BOOTS = 16
 UNLIMITED = 4096
 DUPLICATE_PUBLISHER = "duplicate publisher"
 MAX_NAMES = 64
 """So many unknown fields are counted by name; whoever sends more of them is counted without."""
-
-
-class Sequence:
-    """Which sequence numbers of one (key, boot) have come; bounded memory."""
-
-    def __init__(self, first: int) -> None:
-        self._newest = first - 1
-        self._unseen = set(range(max(0, first - WINDOW), first))
-        self._gaps: set[int] = set()
-        self._newest_sent = 0
-        """When the newest message was sent."""
-
-    def admit(self, seq: int, sent_ns: int = 0) -> bool:
-        """Whether ``seq`` is new.
-
-        Raises :class:`Refused` where it has come before in a message that was sent earlier: this is another message.
-        """
-        if seq <= self._newest and sent_ns > self._newest_sent and not (seq in self._gaps or seq in self._unseen):
-            raise Refused("sequence", f"number {seq} came before; draw a new boot at each start, or count on")
-        self._newest_sent = max(self._newest_sent, sent_ns)
-        if seq > self._newest:
-            self._gaps.update(range(max(self._newest + 1, seq - WINDOW), seq))
-            self._newest = seq
-            if len(self._gaps) > 2 * WINDOW:
-                self._gaps = {gap for gap in self._gaps if gap >= seq - WINDOW}
-            return True
-        if seq in self._gaps:
-            self._gaps.remove(seq)
-            return True
-        if seq in self._unseen:
-            self._unseen.remove(seq)
-            return True
-        return False
-
-    def follow(self, first: int, last: int) -> bool:
-        """Take all numbers from ``first`` to ``last`` at once, if they are the next ones; whether they are."""
-        if first != self._newest + 1:
-            return False
-        self._newest = last
-        return True
-
-    def want(self, numbers: Collection[int]) -> None:
-        """Numbers that have come and were not used are missing again."""
-        self._gaps.update(number for number in numbers if self._newest - WINDOW <= number <= self._newest)
-
-    @property
-    def gaps(self) -> int:
-        """How many numbers between the first and the newest are missing now."""
-        return len(self._gaps)
 
 
 class Admission:
@@ -143,6 +93,9 @@ class Admission:
         """Which of two living processes of one key is refused; None: what all of them send is let in."""
         self.datum_refused: Callable[[Refused, int], None] | None = None
         """Told of each datum that is refused for its time, and when that was."""
+        self.wanted_again: Callable[[str, str, Collection[int]], None] | None = None
+        """Told of the numbers of a key and boot that were refused and are asked for now."""
+        self._gaps_of_forgotten = 0
 
     def admit(self, key: str, payload: bytes, now: int | None = None) -> Message | None:
         """The message, or ``None`` when it is refused or a copy.
@@ -166,16 +119,33 @@ class Admission:
 
     @property
     def gaps(self) -> int:
-        """Messages that are known to exist and have not come."""
-        return sum(sequence.gaps for sequence in self._sequences.values())
+        """Messages that exist and have not come, whether they are still asked for or are given up."""
+        return self._gaps_of_forgotten + sum(sequence.gaps for sequence in self._sequences.values())
+
+    def expect(self, key: str, boot: str, first: int, last: int) -> None:
+        """The messages with these numbers exist and have not been admitted: whoever waited for them gives them up."""
+        identity = (key, boot)
+        if identity not in self._sequences:
+            self._forget_old_boots(key)
+            self._sequences[identity] = Sequence(first)
+        self._sequences[identity].expect(first, last)
+
+    def is_cached(self, key: str) -> bool:
+        """Whether the publisher of a key keeps what it sent; that of live data is asked for nothing."""
+        address = parse(key)
+        return address is not None and not self._configuration.is_live(address.topic, address.name)
+
+    @property
+    def kept_ns(self) -> int | None:
+        """For how long publishers keep what they sent, at least; None in a mesh without a rate."""
+        rate = self._configuration.mesh.rate
+        return None if rate <= 0 else int(max(CACHED_SECONDS, self._configuration.cached / rate) * 1e9)
 
     def gaps_by_key(self) -> dict[str, int]:
         """The same by key, without the keys that lack nothing, and without live ones: those are asked of no cache."""
         gaps: Counter[str] = Counter()
         for (key, _), sequence in self._sequences.items():
-            address = parse(key)
-            is_live = address is not None and self._configuration.is_live(address.topic, address.name)
-            if sequence.gaps and not is_live:
+            if sequence.gaps and self.is_cached(key):
                 gaps[key] += sequence.gaps
         return dict(gaps)
 
@@ -207,6 +177,8 @@ class Admission:
         for address, boot, numbers in self.publishers.take_missed():
             if not self._configuration.is_live(message.topic, message.name):
                 self._sequences[address, boot].want(numbers)
+                if self.wanted_again is not None:
+                    self.wanted_again(address, boot, numbers)
         if pair is not None:
             raise Refused(DUPLICATE_PUBLISHER, pair.words)
 
@@ -282,7 +254,7 @@ class Admission:
     def _forget_old_boots(self, key: str) -> None:
         known = [identity for identity in self._sequences if identity[0] == key]
         for identity in known[: max(0, len(known) - MAX_BOOTS + 1)]:
-            del self._sequences[identity]
+            self._gaps_of_forgotten += self._sequences.pop(identity).gaps
 
 
 def most_generators(configuration: Configuration) -> int:

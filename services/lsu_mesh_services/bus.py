@@ -17,12 +17,17 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
+from lsu_mesh.mesh.keys import parse
+from lsu_mesh.mesh.sequences import Head, read_head
+from lsu_mesh_services.network.gap_recovery import GapRecovery, RecoveryThread
 from lsu_mesh_services.network.link_repair import LinkRepair
 from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
 from lsu_mesh_services.network.security import Certificates
 
 LEASE_MS = 2000
 HEARTBEAT_S = 0.1
+MAX_KEYS = 4096
+"""Keys whose numbers are compared with those of Zenoh."""
 SETTLED_S, MAX_INTRODUCTION_S = 0.5, 5.0
 """A second session leaves the mesh when its links have not changed for so long, and after so long in any case. One that
 is closed while it opens links leaves them open, for as long as its process lives."""
@@ -66,6 +71,10 @@ class Bus:
         self._publishers: dict[str, Any] = {}
         self._declared: list[Any] = []
         self._own_tokens: set[str] = set()
+        self._watches_numbers = False
+        self._offsets: dict[str, int] = {}
+        """By key: by how much Zenoh's number of a message is larger than its own."""
+        self._recovery: RecoveryThread | None = None
         self._reunion: LinkRepair | None = None
         try:
             self._session = zenoh.open(_zenoh_configuration(settings))
@@ -118,7 +127,31 @@ class Bus:
         self._declared.append(self._session.declare_subscriber(key, self._enqueue_sample))
 
     def _enqueue_sample(self, sample: Any) -> None:
-        self._arrivals.put(Arrival("sample", str(sample.key_expr), sample.payload.to_bytes(), self._clock.now()))
+        arrival, head = self._received(sample)
+        self._arrivals.put(arrival, head)
+
+    def _received(self, sample: Any) -> tuple[Arrival, Head | None]:
+        key, payload = str(sample.key_expr), sample.payload.to_bytes()
+        arrival = Arrival("sample", key, payload, self._clock.now())
+        if not self._watches_numbers or parse(key) is None or (head := read_head(payload)) is None:
+            return arrival, None
+        if sample.source_info is not None and (key in self._offsets or len(self._offsets) < MAX_KEYS):
+            self._offsets[key] = int(sample.source_info.source_sn) - head.seq
+        return arrival, head
+
+    def watch_numbers(self) -> None:
+        """Note from now on the numbers of messages when they come: copies are dropped, gaps and losses known."""
+        self._watches_numbers = True
+
+    def recover(self, is_cached: Callable[[str], bool], kept_ns: int | None) -> None:
+        """Watch numbers, and ask the caches of publishers, which keep messages for so long, for what is missed."""
+        self.watch_numbers()
+        recovery = GapRecovery(self._arrivals, self.ask_cache, is_cached, kept_ns)
+        self._recovery = RecoveryThread(recovery, self._arrivals, self._clock.now)
+
+    def bound_age(self, max_age_ns: int, spares: Callable[[str], bool], max_spared_ns: int | None = None) -> None:
+        """Let no message wait for longer; those whose key is spared may for ``max_spared_ns`` (None: for ever)."""
+        self._arrivals.bound_age(max_age_ns, self._clock.now, spares, max_spared_ns=max_spared_ns)
 
     @property
     def arrivals(self) -> ReceiveQueue:
@@ -184,7 +217,7 @@ class Bus:
     def watch_alive(self, key: str) -> None:
         """Queue who is there and who comes and goes, and look for those that only this session does not see."""
         if self._settings.mode == "peer" and self._settings.connect and self._reunion is None:
-            self._reunion = LinkRepair(lambda: self._alive_elsewhere(key), self._introduce)
+            self._reunion = LinkRepair(lambda: self._alive_elsewhere(key), self._introduce, self._arrivals.waits_long)
 
         def changed(sample: Any) -> None:
             is_there = sample.kind == zenoh.SampleKind.PUT
@@ -247,14 +280,18 @@ class Bus:
         mode, target = zenoh.ConsolidationMode.NONE, zenoh.QueryTarget.ALL
         self._session.get(key, answered, target=target, consolidation=mode, timeout=2.0)
 
-    def ask_cache(self, key: str) -> None:
-        """Ask the publisher of a key for all that its cache holds; it is queued as samples."""
+    def ask_cache(self, key: str, span: tuple[int, int] | None = None) -> None:
+        """Ask the publisher of a key for the messages from a number to a number that its cache holds, or for all."""
 
         def answered(reply: Any) -> None:
             if reply.ok is not None:
-                self._enqueue_sample(reply.ok)
+                self._arrivals.put_answer(*self._received(reply.ok))
 
-        selector = f"{key}/@adv/**?_anyke;_max={self._settings.cache}"
+        offset = self._offsets.get(key)
+        chosen = f"_max={self._settings.cache}"
+        if span is not None and offset is not None:
+            chosen = f"_sn={max(0, span[0] + offset)}..{max(0, span[1] + offset)}"
+        selector = f"{key}/@adv/**?_anyke;{chosen}"
         self._session.get(selector, answered, consolidation=zenoh.ConsolidationMode.NONE, timeout=5.0)
 
     def answer(self, key: str, answers: Callable[[], tuple[str, bytes, str] | None]) -> None:
@@ -278,16 +315,23 @@ class Bus:
         return self._arrivals.next(timeout)
 
     def waiting(self) -> int:
-        """ReceiveQueue in the queue."""
+        """Arrivals in the queue."""
         return len(self._arrivals)
 
     @property
     def dropped(self) -> int:
-        """Samples that found the queue full."""
+        """Samples that a full queue had no room for."""
         return self._arrivals.dropped
+
+    @property
+    def copies(self) -> int:
+        """Messages that had come before and were not queued."""
+        return self._arrivals.copies
 
     def close(self) -> None:
         """Undeclare everything and close; errors of a lost link do not matter any more."""
+        if self._recovery is not None:
+            self._recovery.close()
         if self._reunion is not None:
             self._reunion.close()
         for declared in [*reversed(self._declared), *self._publishers.values()]:

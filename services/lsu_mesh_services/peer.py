@@ -5,7 +5,8 @@ from __future__ import annotations
 import gc
 import socket
 import sys
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable, Collection, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
@@ -22,7 +23,7 @@ from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.mesh_start import MeshStart, moment_text
-from lsu_mesh_services.network.gap_recovery import GapRecovery
+from lsu_mesh_services.network.processor_need import ProcessorNeed, Reading
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
@@ -30,6 +31,10 @@ from lsu_mesh_services.stop import Stop
 LOOK_AT_LINKS_NS = 100_000_000
 STANDSTILL_NS = 1_000_000_000
 """So long between two turns of the loop, and the process stood still; so long after it, live data are not believed."""
+MAX_STANDING_SHARE = 0.1
+"""Of that time the loop has computed less than this, where it was stopped and not busy."""
+SPARED = "input"
+"""The topic that a late peer keeps for as long as it can: without inputs a set cannot be carried on."""
 MAX_WAIT = 0.1
 """Seconds between looks at the stop flag and the parent."""
 
@@ -121,7 +126,15 @@ class Peer:
         self._next_look = 0
         self._turned_at, self._settled_at = clock.now(), 0
         self._measured_until = self._worst_queue = self._worst_ns = self._worst_age_ns = 0
-        self._recovery = GapRecovery(node.admission, bus.ask_cache)
+        kept_ns = node.admission.kept_ns
+        bus.recover(node.admission.is_cached, kept_ns)
+        if kept_ns is not None:
+            max_spared_ns = None if node.needs_all_inputs else kept_ns
+            bus.bound_age(kept_ns, lambda address: f"/{SPARED}/" in address, max_spared_ns)
+        node.admission.wanted_again = self._want_again
+        self._waited_ns = 0
+        self._need = ProcessorNeed(self._reading())
+        self._computed_ns, self._copies = time.thread_time_ns(), 0
 
     def declare(self) -> None:
         """Publishers, subscriptions, the liveliness token, queries and answers."""
@@ -177,8 +190,10 @@ class Peer:
         self._watch_links()
         self._start.check(self._bus, self._clock.now())
         self._look_for_standstill(self._clock.now())
-        self._recovery.check(self._clock.now(), self._bus.waiting())
+        self._node.record_lost(self._bus.arrivals.take_losses(), self._clock.now())
+        waits_since = self._clock.now()
         arrival = self._bus.next(self._patience())
+        self._waited_ns += self._clock.now() - waits_since
         began, queued = self._clock.now(), self._bus.waiting() + (arrival is not None)
         age_ns = 0 if arrival is None else began - arrival.arrival_ns
         for taken in range(1, self._node.takes_at_once + 1):
@@ -186,8 +201,13 @@ class Peer:
                 break
             self._publish(self._take(arrival))
             arrival = self._bus.next(0) if taken < self._node.takes_at_once else None
+        self._node.admission.duplicates += self._bus.copies - self._copies
+        self._copies = self._bus.copies
         self._publish(self._node.work(self._clock.now()))
         self._measure(queued, age_ns, self._clock.now() - began)
+
+    def _want_again(self, address: str, boot: str, numbers: Collection[int]) -> None:
+        self._bus.arrivals.want(address, boot, numbers, self._clock.now())
 
     def _measure(self, queued: int, age_ns: int, took_ns: int) -> None:
         """What the next health message tells of the process: the worst since the last one."""
@@ -196,18 +216,29 @@ class Peer:
             self._worst_queue = self._worst_ns = self._worst_age_ns = 0
         self._worst_queue, self._worst_ns = max(self._worst_queue, queued), max(self._worst_ns, took_ns)
         self._worst_age_ns = max(self._worst_age_ns, age_ns)
-        self._node.gauges |= {
+        self._need.measure(self._reading())
+        self._node.gauges |= self._need.gauges | {
             "queue": float(self._worst_queue),
             "queue_ms": self._worst_age_ns * 1e-6,
             "dropped": float(self._bus.dropped),
+            "too old": float(self._bus.arrivals.too_old),
             "step_ms": self._worst_ns * 1e-6,
         }
 
+    def _reading(self) -> Reading:
+        queue = self._bus.arrivals
+        return Reading(
+            self._clock.now(), self._waited_ns, time.process_time_ns(), queue.taken, len(queue), queue.too_old
+        )
+
     def _look_for_standstill(self, now: int) -> None:
         """A process that was stopped cannot tell how long ago came what waited for it."""
-        if now - self._turned_at > STANDSTILL_NS:
+        computed_ns, passed = time.thread_time_ns(), now - self._turned_at
+        if passed > STANDSTILL_NS:
             self._settled_at = now + STANDSTILL_NS
-        self._turned_at = now
+            if computed_ns - self._computed_ns < MAX_STANDING_SHARE * passed:
+                self._bus.arrivals.excuse(now)
+        self._turned_at, self._computed_ns = now, computed_ns
         self._node.admission.stood_still = now < self._settled_at
 
     def _watch_links(self) -> None:

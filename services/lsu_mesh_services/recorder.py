@@ -16,12 +16,14 @@ from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DuplicateProcess
 from lsu_mesh.mesh.keys import key, parse
+from lsu_mesh.mesh.lost_messages import LostMessages
 from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
+from lsu_mesh.mesh.nodes.node import overload_words
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
 from lsu_mesh_services.mesh_start import MeshStart
-from lsu_mesh_services.network.gap_recovery import GapRecovery
+from lsu_mesh_services.network.processor_need import ProcessorNeed, Reading
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.stream import next_part
@@ -118,7 +120,10 @@ class RecorderService:
         self._clock = clock
         self._mesh = configuration.mesh.name
         self._admission = Admission(configuration, TYPES)
-        self._recovery = GapRecovery(self._admission, bus.ask_cache)
+        bus.recover(self._admission.is_cached, self._admission.kept_ns)
+        # without a bound on age: a recording wants all that it can get
+        self._lost, self._copies, self._waited_ns = LostMessages(), 0, 0
+        self._need = ProcessorNeed(self._reading())
         self._boot = secrets.token_hex(8)
         self._started_ns, self._host = clock.now(), socket.gethostname()
         self._sequence = 0
@@ -148,7 +153,13 @@ class RecorderService:
         began, self._queue = self._clock.now(), max(self._queue, self._bus.waiting())
         taken = self._take_all(MAX_AT_ONCE)
         now = self._clock.now()
-        self._recovery.check(now, self._bus.waiting())
+        self._need.measure(self._reading())
+        losses = self._bus.arrivals.take_losses()
+        self._lost.record(losses, now)
+        for loss in losses:
+            self._admission.expect(loss.key, loss.boot, loss.first, loss.last)
+        self._admission.duplicates += self._bus.copies - self._copies
+        self._copies = self._bus.copies
         self._recorder.tick(now)
         self._start.check(self._bus, now)
         links = self._bus.links()
@@ -173,10 +184,18 @@ class RecorderService:
     def _take_all(self, most: int, patience: float = 0.05) -> int:
         """Record what has come, waiting for the first of it so many seconds; returns how much it was."""
         taken = 0
-        while taken < most and (arrival := self._bus.next(0.0 if taken else patience)) is not None:
+        waits_since = self._clock.now()
+        arrival = self._bus.next(patience)
+        self._waited_ns += self._clock.now() - waits_since
+        while arrival is not None:
             self._take(arrival)
             taken += 1
+            arrival = self._bus.next(0.0) if taken < most else None
         return taken
+
+    def _reading(self) -> Reading:
+        queue = self._bus.arrivals
+        return Reading(self._clock.now(), self._waited_ns, time.process_time_ns(), queue.taken, len(queue), 0)
 
     def _take(self, arrival: Arrival) -> None:
         if arrival.what == "sample":
@@ -205,10 +224,14 @@ class RecorderService:
         if self._other_process.take_news(now) is not None:
             print(f"{ROLE_NAME}: {twice}", file=sys.stderr)
         problems += [complaint.text for complaint in self._source_timeouts.complaints(now)]
-        if self._bus.dropped:
-            problems.append(f"{self._bus.dropped} message(s) found the queue full and are not in the recording")
+        if (given_up := self._lost.take_news(now)) is not None:
+            print(f"{ROLE_NAME}: {given_up[0]}", file=sys.stderr)
+        overload = overload_words(self._need.gauges)
+        problems += [] if overload is None else [overload]
+        if self._lost.count:
+            problems.append(f"{self._lost.count} message(s) are not in the recording, last: {self._lost.last}")
         counters = self._admission.counters | {"queue": float(self._queue), "dropped": float(self._bus.dropped)}
-        counters |= {"links": float(self._links), "step_ms": self._longest_ns * 1e-6}
+        counters |= self._need.gauges | {"links": float(self._links), "step_ms": self._longest_ns * 1e-6}
         self._queue = self._longest_ns = 0
         counters |= {f"flushed {flushed}": float(seq) for flushed, seq in self._recorder.flushed.items()}
         health = Health(

@@ -11,6 +11,7 @@ import pytest
 from local_mesh import LocalMesh
 from lsu_mesh_services.bus import Clock
 from lsu_mesh_services.mesh_start import MeshStart
+from lsu_mesh_services.network.receive_queue import ReceiveQueue
 from lsu_mesh_services.peer import Peer
 
 from lsu_mesh.mesh.access import access
@@ -26,6 +27,7 @@ class Line:
 
     def __init__(self) -> None:
         self.answers: dict[str, Answers] = {}
+        self.arrivals = ReceiveQueue()
 
     def answer(self, address: str, answers: Answers) -> None:
         self.answers[address] = answers
@@ -34,6 +36,7 @@ class Line:
         pass
 
     announce = subscribe = subscribe_live = watch_alive = declare_alive = ask = ask_cache = ignore
+    recover = bound_age = ignore
 
 
 @pytest.mark.parametrize("changes", [[], ["filters.box.transfer=predictor"]], ids=["plain", "transfer"])

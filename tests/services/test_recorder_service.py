@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from lsu_mesh_services.mesh_start import MeshStart
-from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
 from lsu_mesh_services.recorder import RecorderService
 
 from lsu_mesh.mesh.config import Configuration, load
@@ -24,19 +24,23 @@ class Line:
     dropped = 0
 
     def __init__(self) -> None:
-        self.arrivals: list[Arrival] = []
+        self.came: list[Arrival] = []
+        self.arrivals = ReceiveQueue()
         self.published: list[Health] = []
 
     def next(self, timeout: float) -> Arrival | None:
-        return self.arrivals.pop(0) if self.arrivals else None
+        return self.came.pop(0) if self.came else None
 
     def waiting(self) -> int:
-        return len(self.arrivals)
+        return len(self.came)
 
     def links(self) -> int:
         return 1
 
-    def ask_cache(self, address: str) -> None:
+    def recover(self, *_: object) -> None:
+        self.copies = 0
+
+    def ask_cache(self, address: str, span: object) -> None:
         raise AssertionError(f"nothing is missing, but {address} was asked for")
 
     def publish(self, address: str, payload: bytes, encoding: str) -> None:
@@ -92,7 +96,7 @@ def test_a_peer_of_which_nothing_is_heard_is_named_and_forgiven(configuration: C
                     origin_ns=watch.time, model=configuration.digest(), role=role, level="OK", reasons=[], counters={},
                 )  # fmt: skip
                 counts[name] += 1
-                line.arrivals.append(Arrival("sample", key("demo", "health", name), encode(health), watch.time))
+                line.came.append(Arrival("sample", key("demo", "health", name), encode(health), watch.time))
         service.turn()
         return line.published[-1]
 

@@ -44,7 +44,8 @@ class Timeline:
         self._remembered = remembered
         self._input_lost = max(INPUT_LOST, configuration.cached)
         self._max_steps = max(MAX_STEPS, 2 * configuration.cached)
-        self._newest_input = 0
+        self._newest_input = self._lost_before = 0
+        self._gives_up_inputs = False
         self._acts_late = configuration.input_delay_ns > 0
         self._dirty: int | None = None
         self._saw_box: dict[int, set[int]] = {}
@@ -70,6 +71,8 @@ class Timeline:
         """The input of a step, which has none yet; a step that was predicted with the input box is done again."""
         step.input = self.inputs[message.step] = message
         self._newest_input = max(self._newest_input, message.step)
+        if self._gives_up_inputs:
+            self._gives_up_inputs, self._lost_before = False, max(self._lost_before, message.step)
         if self.current is not None and message.step < self.current:
             self.do_again(message.step, step)
             if self._acts_late and message.step + 1 < self.current:  # the input before may still act in a step
@@ -77,6 +80,10 @@ class Timeline:
         for k in self._saw_box.pop(message.step, ()):
             if self.current is not None and self.is_over(k):
                 self.do_again(k, self.step(k))
+
+    def give_up_inputs(self) -> None:
+        """Inputs have been lost on this side: those that are missing before the next one that comes do not come."""
+        self._gives_up_inputs = True
 
     def sees_box(self, k: int, j: int) -> None:
         """Data of step k have seen the input box in place of the input of step j: when that comes, k is done again."""
@@ -122,6 +129,8 @@ class Timeline:
         """Whether the input of step k has left its publisher's cache, so that waiting for it makes no sense."""
         if self.current is None:
             return False
+        if k < self._lost_before and not self.has_input(k):
+            return True
         return self._newest_input - k > self._input_lost or len(self._steps) > self._max_steps
 
     def last_lost_input(self, k: int) -> int:

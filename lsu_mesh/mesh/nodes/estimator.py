@@ -8,7 +8,7 @@ A set is handed out as soon as it stands, before the next step's prediction is c
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from lsu_mesh.mesh.estimation.message_fields import told_density
 from lsu_mesh.mesh.estimation.step_record import Combined, Step, published_content
 from lsu_mesh.mesh.estimation.time_update import Origin, predict_step
 from lsu_mesh.mesh.estimation.warm_up import warm_up
+from lsu_mesh.mesh.lost_messages import Loss
 from lsu_mesh.mesh.messages import Bounds, Input, Measurement, Message, Posterior, SupportMessage
 from lsu_mesh.mesh.nodes.node import About, Complaint
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts, input_key
@@ -110,6 +111,12 @@ class Estimator(StartingNode):
         super().record_alive(name, is_there, now)
         if name in self.sources:
             (self.absent.discard if is_there else self.absent.add)(name)
+
+    def record_lost(self, losses: Sequence[Loss], now: int) -> None:
+        """As of every node; inputs that waited for too long are not waited for."""
+        super().record_lost(losses, now)
+        if any(loss.is_too_old and loss.key == input_key(self.configuration) for loss in losses):
+            self.timeline.give_up_inputs()
 
     def take(self, source: str, message: Message, now: int) -> None:
         """Note a source's message for its step; a step that is over will be done again."""

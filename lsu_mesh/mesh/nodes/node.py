@@ -6,7 +6,7 @@ No clock, socket, thread or random source in here. ``now`` is nanoseconds of a c
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from lsu_mesh.mesh.admission import DUPLICATE_PUBLISHER, Admission
@@ -14,6 +14,7 @@ from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS, DuplicateProcess
 from lsu_mesh.mesh.duplicate_publishers import DuplicatePublisher, DuplicatePublishers
 from lsu_mesh.mesh.keys import key
+from lsu_mesh.mesh.lost_messages import Loss, LostMessages
 from lsu_mesh.mesh.messages import VERSION, Event, Health, Message
 
 SECOND = 1_000_000_000
@@ -45,6 +46,12 @@ class Rise:
         return self._at is not None and now - self._at < REMEMBERED_NS
 
 
+def overload_words(gauges: Mapping[str, float]) -> str | None:
+    """How much more processor a peer needs than it gets; None where it gets what it needs."""
+    cores, needed = gauges.get("cores", 0.0), gauges.get("cores_needed", 0.0)
+    return f"overloaded: needs {needed:.2f} cores of {cores:.2f} that it gets" if needed > cores else None
+
+
 class Node(ABC):
     """A peer without its network.
 
@@ -65,6 +72,8 @@ class Node(ABC):
     """Messages that the service around the node hands over before the next tick, however many more are waiting."""
     messages_per_step: int = 1
     """Messages of a step under one key at most, as far as the node knows."""
+    needs_all_inputs: bool = False
+    """Whether it can never continue behind an input that it did not get."""
     answers: ClassVar[tuple[str, ...]] = ()
     """Topics that come as answers to the node's queries, besides its subscriptions."""
 
@@ -84,11 +93,13 @@ class Node(ABC):
         self._refused, self._dropped = Rise(), Rise()
         self._waiting_since: int | None = None
         self.gauges: dict[str, float] = {"links": 0.0}
-        """What the service around it measures, told with the counters: links, queue, queue_ms, dropped, step_ms."""
+        """What the service around it measures, told with the counters: links, queue, queue_ms, dropped, too old,
+        step_ms, cores, cores_needed."""
         topics = {*(topic for topic, _ in self.subscriptions()), *self.answers, "health"}
         self.admission = Admission(configuration, topics)
         self._publishers = self.admission.publishers = DuplicatePublishers(configuration.cached)
         self._other_process = DuplicateProcess(f"{self.role}/{name}", boot)
+        self.lost = LostMessages()
 
     @abstractmethod
     def subscriptions(self) -> Sequence[tuple[str, str]]:
@@ -113,6 +124,12 @@ class Node(ABC):
     def record_alive(self, name: str, is_there: bool, now: int) -> None:
         """The liveliness token of another peer came or went."""
         self._publishers.record_alive(name, is_there, now)
+
+    def record_lost(self, losses: Sequence[Loss], now: int) -> None:
+        """Messages that were on their way to this node are given up; the next tick tells which."""
+        for loss in losses:
+            self.admission.expect(loss.key, loss.boot, loss.first, loss.last)
+        self.lost.record(losses, now)
 
     def work(self, now: int) -> Iterator[Message]:
         """:meth:`advance`, and a health message once a second; each message before what comes after it is computed.
@@ -139,6 +156,9 @@ class Node(ABC):
         if text is not None and other is not None:
             about: About = {"peer": f"{self.role}/{self.name}", "host": other.host, "boot": other.boot}
             found.append(self.warning(DUPLICATE_PROCESS, text, now, about=about))
+        lost = self.lost.take_news(now)
+        if lost is not None:
+            found.append(self.warning("messages-lost", lost[0], now, about=lost[1]))
         return found
 
     def warning(self, code: str, text: str, now: int, *, about: About) -> Event:
@@ -245,8 +265,13 @@ class Node(ABC):
             is_named = bool(pairs) and self.admission.last_reason == DUPLICATE_PUBLISHER  # in full, below
             last = self.admission.last_reason if is_named else self.admission.last_refusal
             found.append(Complaint("WARN", f"refused {refused} message(s) so far, last: {last}"))
+        if (overload := overload_words(self.gauges)) is not None:
+            found.append(Complaint("WARN", overload))
         if self._dropped.is_recent(dropped, now):
-            found.append(Complaint("WARN", f"{dropped:g} message(s) so far found the queue full and were dropped"))
+            text = f"{dropped:g} message(s) so far found no room in the queue and are asked for again"
+            found.append(Complaint("WARN", text))
+        if (lost := self.lost.complaint(now)) is not None:
+            found.append(Complaint("WARN", lost))
         found += [Complaint("WARN", pair.words) for pair in pairs]
         if (twice := self._other_process.complaint(now)) is not None:
             found.append(Complaint("WARN", twice))

@@ -34,6 +34,8 @@ class StartingNode(Node):
         check_times(configuration, self.role, name)
         self.sources = sources
         self.held = HeldSet(configuration, engine, f"{self.role}/{name}", boot)
+        replaces_inputs = engine.model.domain is not None or configuration.input_box is not None
+        self.needs_all_inputs = self.role == "filter" and engine.model.input_count > 0 and not replaces_inputs
         self.timeline = Timeline(configuration, self.history, self.remembered)
         self._candidate: Posterior | None = None
         self._waiting = ""

@@ -19,6 +19,8 @@ FIRST_S, SPREAD_S = 0.3, 0.4
 """Until the first question for a lost peer, and how much longer at random: both ends of a link lose each other."""
 BEGIN_S = 3.0
 """Until the question whether the first attempts have reached everybody."""
+LATE_S = 1.0
+"""A peer that is late with its messages looks again after so long whether it may repair links."""
 MAX_AGE_S = 30.0
 """Between questions for a peer that stays away; each pause is twice the one before."""
 
@@ -76,12 +78,18 @@ class LinkRepair:
         not tell.
     introduce:
         Joins the mesh with one more session until what it is given returns True.
+    is_late:
+        Whether the peer gets too little processor for its messages. Then links wait: others may repair them, and a
+        session more would make the peer later still.
     """
 
     def __init__(
-        self, ask: Callable[[], Collection[str] | None], introduce: Callable[[Callable[[], bool]], None]
+        self,
+        ask: Callable[[], Collection[str] | None],
+        introduce: Callable[[Callable[[], bool]], None],
+        is_late: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._ask, self._introduce = ask, introduce
+        self._ask, self._introduce, self._is_late = ask, introduce, is_late
         self._changed = threading.Condition()
         self._absences = Absences(time.monotonic())
         self._is_closed = False
@@ -116,6 +124,10 @@ class LinkRepair:
         """Until there is something to ask; False when closed."""
         with self._changed:
             while not self._is_closed:
+                at = self._absences.next_at()
+                if at is not None and at <= time.monotonic() and self._is_late():
+                    self._changed.wait(LATE_S)
+                    continue
                 if self._absences.is_due(time.monotonic()):
                     return True
                 at = self._absences.next_at()

@@ -15,8 +15,9 @@ from pathlib import Path
 
 import msgspec
 
-from lsu_mesh.mesh.admission import Admission, Sequence
+from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.messages import TYPES
+from lsu_mesh.mesh.sequences import Sequence
 from lsu_mesh_services.recording.chunks import Damage, Rows, raw_rows
 from lsu_mesh_services.recording.losses import Loss, Losses, damage_words
 from lsu_mesh_services.recording.read import check_recording, parts, read_description, recorded_configuration

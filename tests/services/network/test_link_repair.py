@@ -119,3 +119,25 @@ def test_it_ends_at_once_when_nothing_is_due(monkeypatch: pytest.MonkeyPatch) ->
     mesh = Mesh(monkeypatch)
     mesh.reunion.close()
     assert not mesh.asked.acquire(blocking=False)
+
+
+def test_a_peer_that_is_late_repairs_no_links_until_it_is_current(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lsu_mesh_services.network.link_repair.LATE_S", 0.01)
+    mesh = Mesh(monkeypatch)
+    mesh.reunion.close()
+    looks, is_late = threading.Semaphore(0), threading.Event()
+    is_late.set()
+
+    def looks_whether() -> bool:
+        looks.release()
+        return is_late.is_set()
+
+    mesh.reunion = LinkRepair(mesh.ask, mesh.introduce, looks_whether)
+    mesh.elsewhere, mesh.returns = {"a"}, ["a"]
+    mesh.reunion.record("a", False)
+    for _ in range(20):
+        assert looks.acquire(timeout=5)
+    assert not mesh.asked.acquire(blocking=False)
+    is_late.clear()
+    assert mesh.introduced.wait(5)
+    mesh.reunion.close()
