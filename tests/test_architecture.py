@@ -18,7 +18,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("supports",),
         ("model_arguments",),
         ("model",),
-        ("systems", "simulation", "metrics"),
+        ("systems", "simulation", "metrics", "bank_simulation"),
         ("filters", "fusion"),
         ("identification", "testing"),
         ("rate_identification",),
@@ -78,6 +78,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.fusion": [("intersection", "point"), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
+        ("bank_messages",),
         ("message_examples", "sets", "data_files", "ros2", "json_form"),
         ("config",),
         (
@@ -100,7 +101,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [
-        ("problem", "toml_lines", "write", "measurement_files", "digest"),
+        ("problem", "toml_lines", "write", "measurement_files", "digest", "instances"),
         ("expected", "settings"),
         ("table",),
         (REST,),
