@@ -139,7 +139,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("bus",),
         ("session", "configuration", "mesh_start"),
         ("recording", "monitoring"),
-        ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
+        ("viewers", "peer", "bank_answers", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
         ("ros2",),
         ("mesh_launcher",),
         ("replay",),

@@ -11,11 +11,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from lsu_mesh.mesh.access import recorded_topics
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DuplicateProcess
-from lsu_mesh.mesh.keys import PREFIX, TOPICS, key, parse
-from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
+from lsu_mesh.mesh.keys import PREFIX, key, parse
+from lsu_mesh.mesh.messages import VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
@@ -116,7 +117,7 @@ class RecorderService:
         self._bus = bus
         self._clock = clock
         self._mesh = configuration.mesh.name
-        self._admission = Admission(configuration, TYPES)
+        self._admission = Admission(configuration, recorded_topics(configuration))
         self._recovery = GapRecovery(self._admission, bus.ask_cache)
         self._boot = secrets.token_hex(8)
         self._started_ns, self._host = clock.now(), socket.gethostname()
@@ -137,9 +138,8 @@ class RecorderService:
     def declare(self) -> None:
         """Subscribe to all topics, watch the peers, show that the recorder is there."""
         self._bus.announce(key(self._mesh, "health", ROLE_NAME))
-        for topic in TOPICS:
-            if topic != "live":
-                self._bus.subscribe(f"{PREFIX}/{self._mesh}/{topic}/*")
+        for topic in recorded_topics(self._configuration):
+            self._bus.subscribe(f"{PREFIX}/{self._mesh}/{topic}/*")
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", ROLE_NAME))
 

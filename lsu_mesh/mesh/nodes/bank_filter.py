@@ -67,7 +67,11 @@ class BankFilterNode(BankCourse[BankMeasurement]):
         """The posterior of one instance of the last step, or ``None`` before the first one and of no such instance."""
         if self.last is None or not 0 <= instance < self.last.instances:
             return None
-        return posterior_of(self.configuration, self.last, instance)
+        return self.one(self.last, instance)
+
+    def one(self, message: BankPosterior, instance: int) -> Posterior:
+        """The posterior of one instance in a message of the bank."""
+        return posterior_of(self.configuration, message, instance)
 
     def warm_up(self) -> None:
         warm_up_bank(self.configuration, self.settings)

@@ -11,10 +11,11 @@ from lsu_mesh.mesh.nodes.schedule import GridSchedule, Schedule
 
 
 def bank_node(
-    configuration: Configuration, role: str, name: str, boot: str, *, schedule: Schedule | GridSchedule
+    configuration: Configuration, role: str, name: str, boot: str, *, schedule: Schedule | GridSchedule | None
 ) -> Node:
-    """The node of a plant, a sensor or a filter of a mesh of banks."""
+    """The node of a plant, which needs a schedule, a sensor or a filter of a mesh of banks."""
     if role == "plant":
+        assert schedule is not None
         return BankPlantNode(configuration, name, boot, schedule)
     if role == "sensor":
         return BankSensorNode(configuration, name, boot)

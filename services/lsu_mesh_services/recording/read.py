@@ -15,9 +15,10 @@ from typing import Any, NamedTuple, TypeVar
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
+from lsu_mesh.mesh.access import recorded_topics
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load_values
-from lsu_mesh.mesh.messages import TYPES, Message
+from lsu_mesh.mesh.messages import Message
 from lsu_mesh_services.recording.raw import ARCHETYPE, REFUSED
 from lsu_mesh_services.recording.repair import repair
 
@@ -67,7 +68,7 @@ def read_recording(path: Path) -> Recording:
     files = parts(path)
     description = read_description(files[0])
     configuration = recorded_configuration(path, description)
-    admission = Admission(configuration, TYPES)
+    admission = Admission(configuration, recorded_topics(configuration))
     received, damaged = [], []
     for raw in read_raw(*files):
         duplicates = admission.duplicates
