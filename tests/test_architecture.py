@@ -152,6 +152,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh_services.recording": [
         ("entity_paths", "timeline", "palette", "repair", "timeout", "set_geometry", "synthetic_mesh"),
         ("bands", "raw", "frame"),
+        ("banks",),
         ("read", "blueprint", REST),
         ("stream",),
         ("recorder", "export", "summary"),
