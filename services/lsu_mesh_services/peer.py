@@ -15,6 +15,7 @@ from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Event, Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
 from lsu_mesh.mesh.nodes.bank_filter import BankFilterNode
+from lsu_mesh.mesh.nodes.bank_fusion import BankFusionNode
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
@@ -141,9 +142,9 @@ class Peer:
                 self._answer_last(self._node, name)
         if isinstance(self._node, Estimator):
             self._answer_latest(self._node)
-        if isinstance(self._node, BankFilterNode):
+        if isinstance(self._node, BankFilterNode | BankFusionNode):
             BankAnswers(self._node).declare(self._bus)
-        if isinstance(self._node, Estimator | BankFilterNode):
+        if isinstance(self._node, Estimator | BankFilterNode | BankFusionNode):
             self._answer_model()
 
     def _answer_last(self, node: FusionNode, name: str) -> None:
@@ -254,7 +255,8 @@ class Peer:
     def _canonical(self, sample_key: str) -> str:
         """Answers to ``last/NAME`` are posteriors of NAME."""
         if sample_key == last_key(self._mesh, self._node.name):
-            return key(self._mesh, "posterior", self._node.name)
+            topic = "posterior" if self._node.configuration.instances is None else "bank_posterior"
+            return key(self._mesh, topic, self._node.name)
         return sample_key
 
     def _publish(self, messages: Iterable[Message]) -> None:

@@ -69,10 +69,13 @@ class BankEngine:
         self._lost = np.zeros(n, dtype=np.bool_)
         self._form = _form(self.bank)
 
-    def restarts(self, lost: Flags) -> None:
-        """The sets are those of another process: the first posterior of each says so; ``lost`` are not to believe."""
+    def restarts(self, doubtful: Flags) -> None:
+        """The sets are those of another process: the first posterior of each says so.
+
+        ``doubtful`` ones (N,) are not to believe; they start from the domain, or are lost where there is none.
+        """
         self._restarted[:] = True
-        self._lost = lost.copy()
+        self._start_again(np.flatnonzero(doubtful))
 
     def step(self, data: Mapping[str, BankMeasurement]) -> BankStep:
         """Data update with the messages of the step by sensor; who is missing has measured nothing."""

@@ -92,9 +92,9 @@ class BankFilterNode(BankCourse[BankMeasurement]):
             return oldest
         return 1
 
-    def _begin(self, sets: Sequence[Support], base: Base, lost: Flags) -> None:
+    def _begin(self, sets: Sequence[Support], base: Base, doubtful: Flags) -> None:
         self._engine = BankEngine(self.configuration, self.settings, sets)
-        self._engine.restarts(lost)
+        self._engine.restarts(doubtful)
         self._base = base
 
     def close(self, k: int, arrived: dict[str, BankMeasurement], now: int) -> list[Message]:
