@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from lsu_mesh.mesh.admission import Admission
+from lsu_mesh.mesh.bank_messages import BANK_TYPES
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import key
 from lsu_mesh.mesh.messages import TYPES, Event, Message, Posterior, Truth, encode
+from lsu_mesh.mesh.nodes.bank_nodes import bank_node
 from lsu_mesh.mesh.nodes.file_sensor import FileSensorNode
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
@@ -36,7 +38,7 @@ class LocalMesh:
         self.nodes: dict[str, Node] = {}
         self._carry = carry or (lambda address, payload, node: True)
         self._boots = 0
-        self._reader = Admission(configuration, TYPES)
+        self._reader = Admission(configuration, (*TYPES, *BANK_TYPES))
         for role, name in configuration.peers():
             if role != "recorder":
                 self.start(role, name)
@@ -50,6 +52,8 @@ class LocalMesh:
 
     def _made(self, role: str, name: str, identity: str) -> Node:
         schedule = Schedule(0, self.configuration.mesh.rate)
+        if self.configuration.instances is not None:
+            return bank_node(self.configuration, role, name, identity, schedule=schedule)
         if role == "plant":
             return PlantNode(self.configuration, name, identity, schedule)
         if role == "filter":

@@ -19,7 +19,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("model_arguments",),
         ("model",),
         ("nonlinear",),
-        ("systems", "simulation", "metrics"),
+        ("systems", "simulation", "metrics", "bank_simulation"),
         ("filters", "fusion"),
         ("identification", "testing"),
         ("rate_identification",),
@@ -89,6 +89,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh.fusion": [("point", "stack"), ("intersection",), (REST,), ("policies",), ("fuse",)],
     "lsu_mesh.mesh": [
         ("keys", "messages", "ledger", "unknown_fields", "grid"),
+        ("bank_messages",),
         ("message_examples", "sets", "data_files", "ros2", "json_form", "sequences", "lost_messages"),
         ("config",),
         (
@@ -111,7 +112,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("simulator",),
     ],
     "lsu_mesh.mesh.config": [
-        ("problem", "toml_lines", "write", "measurement_files", "digest"),
+        ("problem", "toml_lines", "write", "measurement_files", "digest", "instances"),
         ("expected", "settings"),
         ("table",),
         (REST,),
@@ -158,7 +159,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("bus",),
         ("session", "configuration", "mesh_start"),
         ("recording", "monitoring"),
-        ("viewers", "peer", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
+        ("viewers", "peer", "bank_answers", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
         ("ros2",),
         ("mesh_launcher",),
         ("benchmarks",),
@@ -182,6 +183,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
     "lsu_mesh_services.recording": [
         ("entity_paths", "timeline", "palette", "container", "timeout", "set_geometry", "synthetic_mesh"),
         ("bands", "raw", "frame"),
+        ("banks",),
         ("read", "blueprint", REST),
         ("stream",),
         ("recorder", "export", "summary"),

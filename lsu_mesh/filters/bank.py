@@ -14,6 +14,7 @@ from lsu_mesh.array_types import Flags, Matrix, Stack
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.compiled import CompiledFilter
 from lsu_mesh.filters.density import Density, noise_covariance
+from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.filters.run_record import FilterRun
 from lsu_mesh.filters.validation import checked_prior, kernel_model, numbers, with_offset
 from lsu_mesh.kernels import batch_run
@@ -81,6 +82,11 @@ class FilterBank:
         return len(self._states)
 
     @property
+    def point_rule(self) -> PointRule:
+        """How the points are chosen."""
+        return self._filter.point_rule
+
+    @property
     def points(self) -> Matrix:
         """Point estimates (N, n)."""
         densities = map(Density, self._estimates.means, self._estimates.covariances)
@@ -94,6 +100,23 @@ class FilterBank:
     def support(self, i: int) -> Support:
         """The set of instance i."""
         return self.kind._make_support(self._states[i].copy())
+
+    def estimates(self, rows: Sequence[int]) -> tuple[Matrix, Matrix, Matrix]:
+        """Points and interval hulls ``(points, lower, upper)`` of these instances, each (len(rows), n)."""
+        means, covariances = self._estimates.means, self._estimates.covariances
+        described = [self._filter._describe(self._states[i]) for i in rows]
+        located = [self._filter._located(self._states[i], Density(means[i], covariances[i])) for i in rows]
+        shape = (len(rows), self._model.state_count)
+        lower, upper = (np.array([one[k] for one in described]).reshape(shape) for k in (1, 2))
+        return np.array(located).reshape(shape), lower, upper
+
+    def reset(self, rows: Sequence[int], support: Support) -> None:
+        """Start these instances again from ``support``, as the ``reset`` of a filter does."""
+        states, densities = _started(self._filter, [checked_prior(self._model, support)])
+        indices = list(rows)
+        self._states[indices] = states[0]
+        self._estimates.means[indices] = densities.means[0]
+        self._estimates.covariances[indices] = densities.covariances[0]
 
     def update(self, Y: ArrayLike) -> Flags:
         """Data update with Y (N, m), NaN or masked: missing; ``False``: the data contradict that instance's set."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.keys import TOPICS, key, last_key, model_key
+from lsu_mesh.mesh.keys import TOPICS, instance_key, key, last_key, model_key
 
 PUBLISHES = {
     "plant": ("truth", "input"),
@@ -16,6 +16,13 @@ PUBLISHES = {
     "recorder": (),
 }
 """Topics of each role, the one that tells its steps last, besides those of every peer."""
+BANK_TOPICS = {
+    "truth": "bank_truth",
+    "measurement": "bank_measurement",
+    "posterior": "bank_posterior",
+    "fused": "bank_fused",
+}
+"""Topics of a mesh of banks, by the topics that they stand for; all others of a role are not published there."""
 EVERY_PEER = ("health", "event")
 
 
@@ -35,6 +42,8 @@ def truth_is_known(configuration: Configuration) -> bool:
 
 def published_topics(configuration: Configuration, role: str, name: str) -> tuple[str, ...]:
     """Topics of one peer, besides those of every peer: a filter without a lag publishes no smoothed sets."""
+    if configuration.instances is not None:
+        return tuple(BANK_TOPICS[topic] for topic in PUBLISHES[role] if topic in BANK_TOPICS)
     smooths = role == "filter" and configuration.filters[name].lag > 0
     return tuple(topic for topic in PUBLISHES[role] if topic != "smoothed" or smooths)
 
@@ -47,13 +56,17 @@ def taken_predictions(configuration: Configuration) -> set[str]:
 
 def recorded(configuration: Configuration) -> list[tuple[str, str]]:
     """``(topic, name)`` of what a recorder listens to: all, but of the predictions those that sets are made from."""
-    topics = [(topic, "*") for topic in TOPICS if topic not in ("live", "prediction")]
+    if configuration.instances is not None:
+        return [(topic, "*") for topic in recorded_topics(configuration)]
+    topics = [(topic, "*") for topic in recorded_topics(configuration) if topic != "prediction"]
     names = ["*"] if configuration.recorder.predictions else sorted(taken_predictions(configuration))
     return [*topics, *(("prediction", name) for name in names)]
 
 
 def subscriptions(configuration: Configuration, role: str, name: str) -> list[tuple[str, str]]:
     """``(topic, name)`` of everything that a node listens to."""
+    if configuration.instances is not None:
+        return [(BANK_TOPICS[topic], one) for topic, one in _of_bank(configuration, role, name)]
     if role == "sensor":
         return _truth(configuration) if configuration.sensors[name].is_simulated else []
     if role == "filter":
@@ -66,6 +79,14 @@ def subscriptions(configuration: Configuration, role: str, name: str) -> list[tu
         listed = [("fused" if source in configuration.fusion else "posterior", source) for source in sources]
         return [*listed, *_inputs(configuration)]
     return []
+
+
+def recorded_topics(configuration: Configuration) -> tuple[str, ...]:
+    """Topics that a mesh has, besides the tokens of its peers."""
+    banks = set(BANK_TOPICS.values())
+    return tuple(
+        topic for topic in TOPICS if topic != "live" and (topic not in banks or configuration.instances is not None)
+    )
 
 
 def access(configuration: Configuration, role: str, name: str) -> Access:
@@ -84,16 +105,32 @@ def access(configuration: Configuration, role: str, name: str) -> Access:
 def reader_access(configuration: Configuration) -> Access:
     """What a subscriber may do: read all, ask all, publish nothing."""
     mesh = configuration.mesh.name
-    reads = tuple(key(mesh, topic, "*") for topic in TOPICS if topic != "live")
-    return Access((), reads, (model_key(mesh), last_key(mesh, "*")), ())
+    reads = tuple(key(mesh, topic, "*") for topic in recorded_topics(configuration))
+    asks = [model_key(mesh), last_key(mesh, "*")]
+    if configuration.instances is not None:
+        asks += [instance_key(mesh, topic, "*", "*") for topic in ("posterior", "fused")]
+    return Access((), reads, tuple(asks), ())
 
 
 def _answers(configuration: Configuration, role: str, name: str) -> tuple[str, ...]:
     """Queries that a peer answers, besides those on what it publishes."""
     mesh = configuration.mesh.name
+    if configuration.instances is not None and role in ("filter", "fusion"):
+        topic = "posterior" if role == "filter" else "fused"
+        last = () if role == "filter" else tuple(last_key(mesh, one) for one in configuration.fusion[name].sources)
+        return (model_key(mesh), instance_key(mesh, topic, name, "*"), *last)
     if role == "fusion":
         return (model_key(mesh), *(last_key(mesh, source) for source in configuration.fusion[name].sources))
     return (model_key(mesh),) if role == "filter" else ()
+
+
+def _of_bank(configuration: Configuration, role: str, name: str) -> list[tuple[str, str]]:
+    """As :func:`subscriptions`, by the topics of single targets."""
+    if role == "sensor":
+        return _truth(configuration) if configuration.sensors[name].is_simulated else []
+    if role == "filter":
+        return [("measurement", sensor) for sensor in configuration.filters[name].sensors]
+    return [("posterior", source) for source in configuration.fusion[name].sources] if role == "fusion" else []
 
 
 def _truth(configuration: Configuration) -> list[tuple[str, str]]:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Collection
 
 from lsu_mesh.fusion.policies import POLICIES
+from lsu_mesh.mesh.bank_messages import BankMeasurement, BankMessage, BankSets, BankTruth, read_any
 from lsu_mesh.mesh.config.settings import CACHED_SECONDS, Configuration
 from lsu_mesh.mesh.duplicate_publishers import DuplicatePublishers
 from lsu_mesh.mesh.input_time import check_beginning
@@ -27,7 +28,6 @@ from lsu_mesh.mesh.messages import (
     Suggestion,
     SupportMessage,
     Truth,
-    read,
 )
 from lsu_mesh.mesh.sequences import Sequence
 
@@ -40,6 +40,10 @@ ROLE_OF_TOPIC = {
     "smoothed": "filter",
     "fused": "fusion",
     "bounds": "identifier",
+    "bank_truth": "plant",
+    "bank_measurement": "sensor",
+    "bank_posterior": "filter",
+    "bank_fused": "fusion",
 }
 MAX_BOOTS = 16
 UNLIMITED = 4096
@@ -87,7 +91,7 @@ class Admission:
         """By topic and field, such as ``posterior.support.colour``."""
         self.stood_still = False
         """Whether what comes now has waited while this process stood still."""
-        self.decoder: Callable[[str, bytes], tuple[Message, tuple[str, ...]]] = read
+        self.decoder: Callable[[str, bytes], tuple[Message, tuple[str, ...]]] = read_any
         """What makes messages of payloads; many receivers in one process may share one with a memory."""
         self.publishers: DuplicatePublishers | None = None
         """Which of two living processes of one key is refused; None: what all of them send is let in."""
@@ -200,17 +204,19 @@ class Admission:
             raise Refused("unknown", f"the configuration has no {role} {address.name!r}")
         if message.model != self._digest:
             raise Refused("model", f"made for model {message.model}, this peer has {self._digest}")
-        if now is not None and isinstance(message, Measurement | Input):
+        if now is not None and isinstance(message, Measurement | BankMeasurement | Input):
             check_live_time(self._configuration, message, now, has_waited=self.stood_still)
         self._check_shape(address.name, message)
-        if isinstance(message, Measurement):
+        if isinstance(message, Measurement | BankMeasurement):
             message = placed(self._configuration, message)
         elif isinstance(message, Input):
             check_beginning(self._configuration, message)
         return message, unknown
 
     def _check_shape(self, name: str, message: Message) -> None:
-        if isinstance(message, Truth):
+        if isinstance(message, BankMessage):
+            found, expected = self._check_instances(name, message)
+        elif isinstance(message, Truth):
             found, expected = len(message.x), self._states
         elif isinstance(message, Input):
             found, expected = len(message.u), self._inputs
@@ -227,7 +233,7 @@ class Admission:
             return
         if found != expected:
             raise Refused("shape", f"{found} numbers, expected {expected}")
-        counts_by_time = isinstance(message, Measurement) and is_timed(message)
+        counts_by_time = isinstance(message, Measurement | BankMeasurement) and is_timed(message)
         if message.step < 1 and not counts_by_time:
             raise Refused("step", "steps count from 1")
         if self._last is not None and message.step > self._last + 1:
@@ -242,6 +248,19 @@ class Admission:
             and complexity(message.support) > self._most_generators
         ):
             raise Refused("complexity", f"more than {self._most_generators} generators or constraints")
+
+    def _check_instances(self, name: str, message: BankMessage) -> tuple[int, int]:
+        """Numbers per instance of a message of a bank, and how many there should be."""
+        instances = self._configuration.instances
+        count = 0 if instances is None else instances.count
+        if message.instances != count:
+            raise Refused("shape", f"{message.instances} instances, this mesh has {count}")
+        if isinstance(message, BankTruth):
+            return message.matrix("x").shape[1], self._states
+        if isinstance(message, BankMeasurement):
+            return message.matrix("y").shape[1], self._rows[name]
+        assert isinstance(message, BankSets)
+        return message.matrix("lower").shape[1], self._states
 
     def _is_new(self, key: str, message: Message) -> bool:
         identity = (key, message.boot)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 PREFIX = "lsu/v1"
 TOPICS = (
     "truth", "input", "measurement", "prediction", "posterior", "smoothed", "fused", "bounds", "health", "event",
-    "live",
+    "live", "bank_truth", "bank_measurement", "bank_posterior", "bank_fused",
 )  # fmt: skip
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 MAX_LENGTH = len(PREFIX) + 3 * 65
@@ -48,6 +48,11 @@ def key(mesh: str, topic: str, name: str) -> str:
 def model_key(mesh: str) -> str:
     """Key of the query that returns the model."""
     return f"{PREFIX}/{mesh}/model"
+
+
+def instance_key(mesh: str, topic: str, name: str, instance: int | str) -> str:
+    """Key of the query that returns the last set of one instance of a bank; ``"*"``: of each of them."""
+    return f"{PREFIX}/{mesh}/{topic}/{name}/{instance}"
 
 
 def last_key(mesh: str, name: str) -> str:

@@ -9,15 +9,16 @@ seconds later; so nobody takes live data from caches, and a process that stood s
 
 from __future__ import annotations
 
+from lsu_mesh.mesh.bank_messages import BankMeasurement
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused
 
 SECOND = 1_000_000_000
 
 
-def ahead_ns(configuration: Configuration, message: Measurement | Input, now: int) -> int | None:
+def ahead_ns(configuration: Configuration, message: Measurement | BankMeasurement | Input, now: int) -> int | None:
     """How far the time of a live datum lies ahead of ``now`` (negative: behind); None for what is not live."""
-    if isinstance(message, Measurement):
+    if isinstance(message, Measurement | BankMeasurement):
         sensor = configuration.sensors[message.name]
         if not sensor.is_live or (message.time_error_ns is None and message.step < 1):
             return None
@@ -29,7 +30,7 @@ def ahead_ns(configuration: Configuration, message: Measurement | Input, now: in
 
 
 def check_live_time(
-    configuration: Configuration, message: Measurement | Input, now: int, *, has_waited: bool = False
+    configuration: Configuration, message: Measurement | BankMeasurement | Input, now: int, *, has_waited: bool = False
 ) -> None:
     """Refuse a live datum from the future, from too long ago, or one that ``has_waited`` for the receiver.
 
@@ -44,7 +45,7 @@ def check_live_time(
         return
     if has_waited:
         raise Refused("waited", f"{message.name} sent it while this process stood still; its time cannot be judged")
-    error = (message.time_error_ns or 0) if isinstance(message, Measurement) else 0
+    error = (message.time_error_ns or 0) if isinstance(message, Measurement | BankMeasurement) else 0
     mesh = configuration.mesh
     if ahead - error > mesh.future_ns:
         text = (
@@ -62,7 +63,7 @@ def check_live_time(
 
 def can_be_true(configuration: Configuration, message: Message, now: int) -> bool:
     """Whether nobody refuses a message for its time, as :func:`check_live_time` does, where it comes at ``now``."""
-    if not isinstance(message, Measurement | Input):
+    if not isinstance(message, Measurement | BankMeasurement | Input):
         return True
     try:
         check_live_time(configuration, message, now)

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 from msgspec import structs
 
+from lsu_mesh.mesh.bank_messages import BankMeasurement
 from lsu_mesh.mesh.config.settings import Configuration, SensorSettings
 from lsu_mesh.mesh.messages import Measurement, Refused
+
+Datum = TypeVar("Datum", bound=Measurement | BankMeasurement)
 
 LEAST_TOLERANCE_NS = 1
 """A moment that was rounded to a nanosecond is on the grid."""
 
 
-def is_timed(message: Measurement) -> bool:
+def is_timed(message: Measurement | BankMeasurement) -> bool:
     """Whether it was made at ``time_ns``; else at the time of its step, and ``time_ns`` is not read."""
     return message.time_error_ns is not None
 
 
-def placed(configuration: Configuration, message: Measurement) -> Measurement:
+def placed(configuration: Configuration, message: Datum) -> Datum:
     """The measurement with its step k, ``t_{k−1} < t ≤ t_k``; 0 where it is of t_0 or before.
 
     Discrete models know nothing between steps: a datum within the sensor's tolerance of a step is of that step, and

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import struct
 from typing import Any
 
 import msgspec
 
+from lsu_mesh.mesh.bank_messages import BANK_TYPES, BankMessage
 from lsu_mesh.mesh.messages import TYPES, VERSION, Bounds, Message, OrthotopeMessage, Rejection
 
 
@@ -92,6 +95,40 @@ def example(topic: str) -> Message:
         },
     }
     return TYPES[topic](**common, **own[topic])
+
+
+def bank_example(topic: str) -> BankMessage:
+    """A message of a bank of two instances, for documentation and tests."""
+    common: dict[str, Any] = {
+        "v": VERSION, "src": "filter/targets", "boot": "0123456789abcdef", "seq": 41, "step": 42, "instances": 2,
+        "sent_ns": 1_700_000_000_020_000_000, "origin_ns": 1_700_000_000_018_000_000, "model": "b015983c54e6e4d2",
+    }  # fmt: skip
+    used = [("bank_measurement", "sensor/radar", "8899aabbccddeeff", 41)]
+    sets: dict[str, Any] = {
+        "lower": _packed(-0.25, 0.5, 3.0, 4.0), "upper": _packed(0.75, 1.0, 3.5, 4.5),
+        "point": _packed(0.25, 0.75, 3.25, 4.25), "statuses": b"\x00\x01", "guarantee": "declared",
+        "base": ("bank_posterior", "filter/targets", "0123456789abcdef", 40), "used": used, "missing": ["lidar"],
+        "algorithm": 1,
+    }  # fmt: skip
+    own: dict[str, dict[str, Any]] = {
+        "bank_truth": {"x": _packed(0.1, 0.8, 3.1, 4.2)},
+        "bank_measurement": {"y": _packed(0.7, math.nan), "time_ns": 1_700_000_000_017_500_000, "time_error_ns": 0},
+        "bank_posterior": sets
+        | {
+            "kind": "LSUO",
+            "support": "orthotope",
+            "log_volume": _packed(-0.6931471805599453, -1.3862943611198906),
+            "volume_of": "support",
+            "epoch": 0,
+            "point_rule": "mean",
+        },
+        "bank_fused": sets | {"base": "sources", "policy": "intersect", "faults": 0},
+    }
+    return BANK_TYPES[topic](**common, **own[topic])
+
+
+def _packed(*numbers: float) -> bytes:
+    return struct.pack(f"<{len(numbers)}d", *numbers)
 
 
 if __name__ == "__main__":

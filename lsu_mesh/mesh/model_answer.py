@@ -72,6 +72,8 @@ class ModelAnswer(Struct, frozen=True, kw_only=True):
     """``dt`` as a fraction of seconds, such as ``1/30``; ``None``: the decimal of ``dt``."""
     plant: str | None = None
     """Name of the plant whose inputs a program sends; ``None``: no program may."""
+    instances: int | None = None
+    """N of a mesh of banks, whose messages hold the data of N targets; ``None``: it has no bank."""
 
 
 def model_answer(configuration: Configuration, boot: str | None = None) -> ModelAnswer:
@@ -100,6 +102,7 @@ def model_answer(configuration: Configuration, boot: str | None = None) -> Model
         plant=plant.name if plant is not None and plant.is_external else None,
         offset=None if model.a is None else model.a.tolist(),
         continuous=None if configuration.continuous is None else _dynamics(configuration.continuous),
+        instances=None if configuration.instances is None else configuration.instances.count,
         schedule=[LaterModel(first=one.first, model=_dynamics(one.model)) for one in configuration.schedule] or None,
     )  # fmt: skip
 

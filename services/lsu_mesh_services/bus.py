@@ -305,6 +305,20 @@ class Bus:
 
         self._declared.append(self._session.declare_queryable(key, reply))
 
+    def answer_each(self, keys: str, answers: Callable[[str], tuple[bytes, str] | str]) -> None:
+        """Answer queries on single keys of the expression ``keys`` with ``(payload, encoding)``, or with an error."""
+
+        def reply(query: Any) -> None:
+            with query:
+                asked = str(query.key_expr)
+                found = answers(asked)
+                if isinstance(found, str):
+                    query.reply_err(found)
+                else:
+                    query.reply(asked, found[0], encoding=found[1])
+
+        self._declared.append(self._session.declare_queryable(keys, reply))
+
     def links(self) -> int:
         """How many peers and routers this session is connected to."""
         info = self._session.info

@@ -18,6 +18,7 @@ import math
 import re
 import secrets
 import socket
+import struct
 import threading
 import time as clock
 import tomllib
@@ -173,6 +174,46 @@ class Estimate:
         support = {key: np.array(value) if _is_numbers(value) else value for key, value in self.support.items()}
         lower, upper, point = np.array(self.lower), np.array(self.upper), np.array(self.point)
         return replace(self, lower=lower, upper=upper, point=point, support=support)
+
+
+STATUSES = ("ok", "predicted", "inconsistent", "restarted")
+
+
+@dataclass(frozen=True)
+class BankEstimate:
+    """The sets of all targets of a bank: ``lower[i, j]`` is of state j of target i, counted from 0."""
+
+    name: str
+    step: int
+    time_ns: int | None
+    instances: int
+    lower: Any
+    upper: Any
+    point: Any
+    statuses: Any
+    """Places in ``STATUSES``; of a target that is ``inconsistent`` nothing is promised."""
+    raw: Mapping[str, Any]
+
+    def status(self, target: int) -> str:
+        """The status of one target in words."""
+        return STATUSES[self.statuses[target]]
+
+    def numpy(self) -> BankEstimate:
+        """The same with NumPy arrays."""
+        import numpy as np
+
+        lower, upper, point = np.asarray(self.lower), np.asarray(self.upper), np.asarray(self.point)
+        return replace(self, lower=lower, upper=upper, point=point, statuses=np.frombuffer(self.statuses, np.uint8))
+
+    @classmethod
+    def read(cls, name: str, time_ns: int | None, raw: Mapping[str, Any]) -> BankEstimate:
+        """The estimate in a message ``bank_posterior`` or ``bank_fused``."""
+        shape = [raw["instances"], len(raw["lower"]) // (8 * raw["instances"])]
+        lower, upper, point = (memoryview(raw[key]).cast("d", shape) for key in ("lower", "upper", "point"))
+        return cls(
+            name, raw["step"], time_ns, raw["instances"], lower=lower, upper=upper, point=point,
+            statuses=raw["statuses"], raw=raw,
+        )  # fmt: skip
 
 
 def _is_numbers(value: object) -> bool:
@@ -337,6 +378,8 @@ class Source:
         """
         model = self._mesh.model()
         try:
+            if model.raw.get("instances") is not None:
+                raise WrongValue(f"mesh {self._mesh.name!r} is one of banks; publish_all() sends a row per target")
             numbers = self._numbers(values, self._outputs(model))
             fields, step = self._timed(model, time, **more)
         except WrongValue:
@@ -345,6 +388,41 @@ class Source:
         if fields is not None:
             self._put(model, self._topic, step, {("y" if self.role == "sensor" else "u"): numbers} | fields)
             self.counters["published"] += 1
+
+    def publish_all(self, values: Any, time: Time = "now", **more: Any) -> None:
+        """Send what was measured of all targets of a mesh of banks: a row per target, None or NaN was not measured.
+
+        ``values``: rows, or an array of NumPy (N, m); the rest is as in :meth:`publish`.
+        """
+        model = self._mesh.model()
+        try:
+            count = model.raw.get("instances")
+            if count is None:
+                raise WrongValue(f"mesh {self._mesh.name!r} has no bank; publish() sends the values of one target")
+            y = self._rows(values, self._outputs(model), count)
+            fields, step = self._timed(model, time, **more)
+        except WrongValue:
+            self.counters["refused"] += 1
+            raise
+        if fields is not None:
+            self._put(model, "bank_measurement", step, {"instances": count, "y": y} | fields)
+            self.counters["published"] += 1
+
+    def _rows(self, values: Any, outputs: Sequence[str], count: int) -> bytes:
+        """Rows of float64, little-endian."""
+        width = len(outputs)
+        if hasattr(values, "astype"):
+            array = values.astype("<f8")
+            if array.shape != (count, width):
+                raise WrongValue(f"{self.name}: found shape {array.shape}, expected {(count, width)}, a row per target")
+            if (abs(array) == math.inf).any():
+                raise WrongValue(f"{self.name}: a value is infinite; give NaN where nothing was measured")
+            return bytes(array.tobytes())
+        rows = [self._numbers(row, outputs) for row in values]
+        if len(rows) != count:
+            raise WrongValue(f"{self.name}: found {len(rows)} row(s), expected {count}, one per target")
+        flat = [math.nan if value is None else value for row in rows for value in row]
+        return struct.pack(f"<{len(flat)}d", *flat)
 
     @property
     def outputs(self) -> Sequence[str]:
@@ -520,7 +598,9 @@ class Mesh:
                 return known
             session = self._session(name)
             source = self._sources[role, name] = Source(self, session, role, name=name)
-        self._settle(session, self.key("measurement" if role == "sensor" else "input", name))
+        topic = "input" if role == "plant" else "measurement"
+        is_bank = role == "sensor" and self.model().raw.get("instances") is not None
+        self._settle(session, self.key("bank_measurement" if is_bank else topic, name))
         return source
 
     def _settle(self, session: Any, key: str) -> None:
@@ -541,18 +621,33 @@ class Mesh:
         self._subscribe(("posterior", "fused"), name, stream, made=self._estimate, history=history)
         return stream
 
+    def bank(self, name: str, *, history: int = 1, keep: int = 64) -> Stream[BankEstimate]:
+        """What the bank, or the fusion of banks, of that name publishes of all its targets."""
+        stream: Stream[BankEstimate] = Stream(keep)
+        self._subscribe(("bank_posterior", "bank_fused"), name, stream, made=self._bank_estimate, history=history)
+        return stream
+
     def events(self, name: str = "*", *, keep: int = 1024) -> Stream[Event]:
         """What the peers of the mesh tell people, from now on."""
         stream: Stream[Event] = Stream(keep)
         self._subscribe(("event",), name, stream, made=_event, history=0)
         return stream
 
-    def latest(self, name: str, timeout: float = 2.0) -> Estimate | None:
-        """The newest estimate of a filter or fusion; None where nobody of that name answers."""
-        session, found = self._session(READER), []
+    def latest(self, name: str, timeout: float = 2.0, *, target: int | None = None) -> Estimate | None:
+        """The newest estimate of a filter or fusion, or of one target of a bank; None where nobody answers.
+
+        Raises :class:`WrongValue` where the bank has no such target, or has published nothing yet.
+        """
+        session, found, errors = self._session(READER), [], list[str]()
         for topic in ("posterior", "fused"):
-            replies = session.get(self.key(topic, name), timeout=timeout)
-            found += [msgpack.unpackb(reply.ok.payload.to_bytes()) for reply in replies if reply.ok is not None]
+            key = self.key(topic, name if target is None else f"{name}/{target}")
+            for reply in session.get(key, timeout=timeout):
+                if reply.ok is not None:
+                    found.append(msgpack.unpackb(reply.ok.payload.to_bytes()))
+                elif target is not None and reply.err is not None:
+                    errors.append(reply.err.payload.to_string())
+        if errors and not found:
+            raise WrongValue(errors[0])
         newest = max(found, key=lambda message: int(message["step"]), default=None)
         return None if newest is None else self._estimate(name, newest)
 
@@ -586,13 +681,20 @@ class Mesh:
         common = ("lower", "upper", "point", "status", "guarantee", "support")
         return Estimate(name, raw["step"], time_ns, **{key: raw[key] for key in common}, raw=raw)
 
+    def _bank_estimate(self, name: str, raw: dict[str, Any]) -> BankEstimate:
+        model = self._model
+        time_ns = None if model is None or model.digest != raw["model"] else model.time_of(raw["step"])
+        return BankEstimate.read(name, time_ns, raw)
+
     def key(self, topic: str, name: str) -> str:
         """The key of a topic of a peer."""
         return f"lsu/v1/{self.name}/{topic}/{name}"
 
     def declare_publisher(self, session: Any, key: str) -> Any:
         """A publisher whose messages late subscribers get too."""
-        cached = LEAST_CACHED if self._model is None else max(LEAST_CACHED, math.ceil(CACHED_S / self._model.dt))
+        cached = LEAST_CACHED if self._model is None else math.ceil(CACHED_S / self._model.dt)
+        if "/bank_" not in key:  # messages of banks are large
+            cached = max(LEAST_CACHED, cached)
         return ext.declare_advanced_publisher(
             session, key, congestion_control=zenoh.CongestionControl.DROP, cache=ext.CacheConfig(cached),
             publisher_detection=True,

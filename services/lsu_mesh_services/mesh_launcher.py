@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
+from lsu_mesh.mesh.access import BANK_TOPICS
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import PREFIX, READER, key, parse
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.configuration import DEMO, flags, load_or_explain
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
 from lsu_mesh_services.mesh_start import moment_text
+from lsu_mesh_services.monitoring.bank_report import BankReport
 from lsu_mesh_services.monitoring.run_report import RunReport
 from lsu_mesh_services.monitoring.table import Progress, print_json, print_table
 from lsu_mesh_services.network.receive_queue import Arrival
@@ -151,7 +153,7 @@ def _run_mesh(
     with Bus(settings, clock) as bus:
         recording = None if options.no_record else _recording_path(configuration, options)
         supervisor = Supervisor(configuration.supervisor, forks=True)
-        report = RunReport(configuration)
+        report = RunReport(configuration) if configuration.instances is None else BankReport(configuration)
         run = Run(
             configuration=configuration,
             options=options,
@@ -187,7 +189,9 @@ def _recording_path(configuration: Configuration, options: argparse.Namespace) -
 
 
 def _supervise(run: Run) -> int:
+    is_bank = run.configuration.instances is not None
     for topic in ("truth", "posterior", "fused", "health", "event"):
+        topic = BANK_TOPICS.get(topic, topic) if is_bank else topic
         run.bus.subscribe(f"{PREFIX}/{run.configuration.mesh.name}/{topic}/*")
     run.bus.watch_alive(key(run.configuration.mesh.name, "live", "*"))
     if run.player is not None:

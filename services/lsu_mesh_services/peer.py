@@ -16,10 +16,13 @@ from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Event, Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
+from lsu_mesh.mesh.nodes.bank_filter import BankFilterNode
+from lsu_mesh.mesh.nodes.bank_fusion import BankFusionNode
 from lsu_mesh.mesh.nodes.estimator import Estimator
 from lsu_mesh.mesh.nodes.filter import FilterNode
 from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
+from lsu_mesh_services.bank_answers import BankAnswers
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.mesh_start import MeshStart, moment_text
@@ -156,6 +159,10 @@ class Peer:
                 self._answer_last(self._node, name)
         if isinstance(self._node, Estimator):
             self._answer_latest(self._node)
+        if isinstance(self._node, BankFilterNode | BankFusionNode):
+            BankAnswers(self._node).declare(self._bus)
+        if isinstance(self._node, Estimator | BankFilterNode | BankFusionNode):
+            self._answer_model()
 
     def _answer_last(self, node: FusionNode, name: str) -> None:
         def answers() -> tuple[str, bytes, str] | None:
@@ -175,7 +182,10 @@ class Peer:
             return None if last is None else (own_key, encode(last), encoding(last.topic))
 
         self._bus.answer(own_key, latest)
-        model, asked = encode_model(model_answer(node.configuration, node.boot)), model_key(self._mesh)
+
+    def _answer_model(self) -> None:
+        model = encode_model(model_answer(self._node.configuration, self._node.boot))
+        asked = model_key(self._mesh)
         self._bus.answer(asked, lambda: (asked, model, "application/msgpack"))
 
     def tell_moved(self) -> None:
@@ -283,7 +293,8 @@ class Peer:
     def _canonical(self, sample_key: str) -> str:
         """Answers to ``last/NAME`` are posteriors of NAME."""
         if sample_key == last_key(self._mesh, self._node.name):
-            return key(self._mesh, "posterior", self._node.name)
+            topic = "posterior" if self._node.configuration.instances is None else "bank_posterior"
+            return key(self._mesh, topic, self._node.name)
         return sample_key
 
     def _publish(self, messages: Iterable[Message]) -> None:

@@ -11,13 +11,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from lsu_mesh.mesh.access import recorded
+from lsu_mesh.mesh.access import recorded, recorded_topics
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DuplicateProcess
 from lsu_mesh.mesh.keys import key, parse
 from lsu_mesh.mesh.lost_messages import LostMessages
-from lsu_mesh.mesh.messages import TYPES, VERSION, Health, encode, encoding
+from lsu_mesh.mesh.messages import VERSION, Health, encode, encoding
 from lsu_mesh.mesh.nodes.node import overload_words
 from lsu_mesh.mesh.nodes.source_timeout import SourceTimeouts
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
@@ -119,7 +119,7 @@ class RecorderService:
         self._bus = bus
         self._clock = clock
         self._mesh = configuration.mesh.name
-        self._admission = Admission(configuration, TYPES)
+        self._admission = Admission(configuration, recorded_topics(configuration))
         bus.recover(self._admission.is_cached, self._admission.kept_ns)
         # without a bound on age: a recording wants all that it can get
         self._lost, self._copies, self._waited_ns = LostMessages(), 0, 0

@@ -10,6 +10,7 @@ import msgpack
 import msgspec
 import pytest
 
+from lsu_mesh.mesh.bank_messages import BANK_TYPES
 from lsu_mesh.mesh.message_examples import example
 from lsu_mesh.mesh.messages import TYPES, Message, decode, encode
 from lsu_mesh.mesh.model_answer import ModelAnswer
@@ -76,11 +77,22 @@ def test_plain_msgpack_reads_what_we_write_and_we_read_what_it_writes(topic: str
     assert decode(topic, msgpack.packb(plain)) == message
 
 
+@pytest.mark.parametrize("topic", sorted(BANK_TYPES))
+def test_the_page_lists_exactly_the_fields_of_a_topic_of_banks(page: str, topic: str) -> None:
+    fields = set(BANK_TYPES[topic].__struct_fields__) - set(Message.__struct_fields__)
+    assert documented(page, f"`{topic}`") - {"step"} == fields
+    told = {
+        name: kind.partition(" = ")[2] for names, kind in rows(page, f"`{topic}`") for name in names if " = " in kind
+    }
+    optional = {field.name: field.default for field in msgspec.structs.fields(BANK_TYPES[topic]) if not field.required}
+    assert told == {name: "nil" if value is None else repr(value) for name, value in optional.items()}
+
+
 def test_the_example_on_the_page_is_what_the_code_prints(page: str) -> None:
     shown = json.loads(page.split("```json\n")[1].split("```")[0])
     assert shown == msgpack.unpackb(encode(example("posterior")))
 
 
 def test_every_topic_has_a_key_on_the_page(page: str) -> None:
-    for topic in TYPES:
+    for topic in (*TYPES, *BANK_TYPES):
         assert f"`lsu/v1/M/{topic}/NAME`" in page

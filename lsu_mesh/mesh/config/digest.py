@@ -49,6 +49,10 @@ def _further(configuration: Configuration, first: LSUModel) -> Iterator[tuple[st
     for name in sorted(configuration.sensors):
         for part, rows in _of_sensor(configuration.sensors[name]):
             yield f"{part} {name}", _matrix(np.array(rows, dtype=np.float64))
+    if configuration.instances is not None:
+        yield "instances", struct.pack("<q", configuration.instances.count)
+        if configuration.instances.A is not None:
+            yield "instances A", (configuration.instances.A + 0.0).astype("<f8").tobytes()
     if depends_on_time(configuration):
         grid = configuration.grid
         yield "dt", f"{grid.dt.numerator}/{grid.dt.denominator}".encode()

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, get_args
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter, GainOf
 from lsu_mesh.filters.registry import filter_class, filter_kinds
+from lsu_mesh.mesh.config.bank import read_instance_count
 from lsu_mesh.mesh.config.expected import Expected, Unfit, choice, known_names, nats
 from lsu_mesh.mesh.config.filter_options import FilterOptions, try_options
 from lsu_mesh.mesh.config.settings import FilterSettings, OnInconsistency, SensorSettings, TransferWay
@@ -74,6 +75,9 @@ def read_filter(
     on_inconsistency = _read_inconsistency(table)
     reset_after = table.whole("reset_after", 5, low=1)
     adopt = _read_adopt(table, peers["identifier"], system)
+    instances = read_instance_count(table)
+    if instances and "history" in table.values:
+        table.without("history", "has no effect: a bank does not do steps again", "remove it")
     options = _read_options(table, kind, sensors, chosen=chosen, system=system)
     return FilterSettings(
         name=name,
@@ -89,6 +93,7 @@ def read_filter(
         reset_after=reset_after,
         options=options,
         adopt=adopt,
+        instances=instances,
     )
 
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from lsu_mesh.mesh.config.bank import Others, read_instances
 from lsu_mesh.mesh.config.exact_times import keep_digits, spell_out_dates
 from lsu_mesh.mesh.config.expected import shown
 from lsu_mesh.mesh.config.filters import kind_of, read_filter
@@ -155,6 +156,8 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     fusion = {name: read_fusion(table, name, filters, peers) for name, table in fusion_tables.items()}
     identifiers = {name: read_identifier(table, name, sensors) for name, table in identifier_tables.items()}
     check_learning(filters, fusion, identifiers, sound=sound, problems=problems)
+    others = Others(plant, fusion, identifiers)
+    instances = read_instances(system, filters, sensors, others, path.parent, problems)
     recorder, network = _read_recorder(root), read_network(root)
     supervisor = _read_supervisor(root)
     root.finish()
@@ -218,6 +221,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
         continuous=system.continuous,
         schedule=system.schedule,
         input_delay_ns=input_delay_ns(mesh, plant, system.input_delay_ns),
+        instances=instances,
     )
 
 

@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+from lsu_mesh.mesh.bank_messages import MAX_INSTANCES
 from lsu_mesh.mesh.config.data_file_keys import KEYS, read_file_format
-from lsu_mesh.mesh.config.expected import shown
+from lsu_mesh.mesh.config.expected import each, shown, whole
 from lsu_mesh.mesh.config.measurement_files import FileProblems, read_columns
 from lsu_mesh.mesh.config.problem import Problems, data_problem
 from lsu_mesh.mesh.config.ros2 import read_topic
@@ -29,6 +30,7 @@ from lsu_mesh.model import LSUModel
 INPUTS = ("normal", "sine", "zero")
 SOURCES: tuple[Source, ...] = get_args(Source)
 FAULTS: tuple[FaultKind, ...] = get_args(FaultKind)
+INSTANCES = each("a list of instances of a bank, counted from 0", whole(0, MAX_INSTANCES - 1))
 
 
 def read_plant(
@@ -120,8 +122,9 @@ def _read_fault(table: Table) -> SensorFault:
     if first > last:
         table.wrong("to", f"is {last}, before from = {first}", f"a whole number ≥ {first}")
     size = table.number("size", 1.0)
+    named: list[int] = table.read("instances", [], INSTANCES)
     table.finish()
-    return SensorFault("bias" if kind is REQUIRED else kind, first, last, size)
+    return SensorFault("bias" if kind is REQUIRED else kind, first, last, size, tuple(named))
 
 
 def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementFileSettings | None:

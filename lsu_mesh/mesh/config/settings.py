@@ -17,6 +17,7 @@ from lsu_mesh.filters.grid import OffGrid
 from lsu_mesh.filters.point_rule import PointRule
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.mesh.config.digest import digest
+from lsu_mesh.mesh.config.instances import Instances
 from lsu_mesh.mesh.config.problem import Problem
 from lsu_mesh.mesh.data_files.moments import exact_dt, start_time_ns
 from lsu_mesh.mesh.data_files.settings import DataFileSettings
@@ -80,12 +81,13 @@ MeasurementFileSettings = DataFileSettings
 
 @dataclass(frozen=True)
 class SensorFault:
-    """A simulated fault of a sensor at steps first … last: bias, drift (per step), stuck, random, or lost."""
+    """A fault at steps first … last: bias, drift (per step), stuck, random, or lost; ``instances``: of these only."""
 
     kind: FaultKind
     first: int
     last: int
     size: float
+    instances: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -169,6 +171,8 @@ class FilterSettings:
     """Whose volumes the published gain of transfers compares."""
     publish_when: float = 0.0
     """Nats that a prediction has to gain on what others hold of the one published last; 0: each is published."""
+    instances: int = 0
+    """N of a bank; 0: one filter."""
 
     @property
     def lag(self) -> int:
@@ -290,6 +294,7 @@ class Configuration:
     """Models that replace the first one from a step on, in order."""
     input_delay_ns: int = 0
     """An input may take so long to act after its step began."""
+    instances: Instances | None = None
 
     @functools.cached_property
     def grid(self) -> Grid:
@@ -333,7 +338,7 @@ class Configuration:
 
     def is_live(self, topic: str, name: str) -> bool:
         """Whether messages of a topic and name come from a program, whose clock nobody of the mesh knows."""
-        if topic == "measurement":
+        if topic in ("measurement", "bank_measurement"):
             return name in self.sensors and self.sensors[name].is_live
         return topic == "input" and self.plant is not None and self.plant.is_external and name == self.plant.name
 
@@ -378,8 +383,8 @@ class Configuration:
     @property
     def cached(self) -> int:
         """Messages per key that a publisher keeps for those who come late, or who missed them."""
-        given = self.network.cache
-        return given if given is not None else max(LEAST_CACHED, math.ceil(CACHED_SECONDS * self.mesh.rate))
+        given, least = self.network.cache, LEAST_CACHED if self.instances is None else 1
+        return given if given is not None else max(least, math.ceil(CACHED_SECONDS * self.mesh.rate))
 
     def digest(self) -> str:
         """16 hexadecimal characters over the mathematics of the mesh, not over bounds; see ``docs/protocol.md``."""

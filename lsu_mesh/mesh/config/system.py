@@ -35,6 +35,8 @@ class System:
     is_continuous: bool = False
     """What the file says, also where the model could not be made."""
     grid: Grid | None = None
+    instances: Table | None = None
+    """``[model.instances]``, which is read once the banks are known."""
 
 
 def read_model(table: Table | None, problems: Problems, grid: Grid | None) -> System:
@@ -53,11 +55,13 @@ def read_model(table: Table | None, problems: Problems, grid: Grid | None) -> Sy
     domain = read_box(table.table("domain"), problems)
     input_box = read_box(table.table("input_box"), problems)
     prior = read_box(table.table("prior", required=True), problems)
+    instances = table.table("instances")
     table.finish()
     if delay and not is_continuous:
         remedy = "remove it, or set continuous = true"
         table.without("input_delay", "has no effect: the inputs of a discrete model act for a whole step", remedy)
     known: dict[str, Any] = {"prior": prior, "input_box": input_box, "is_continuous": is_continuous, "grid": grid}
+    known["instances"] = instances
     if not isinstance(A, list):
         return System(**known)
     known["state_count"] = count = len(A)

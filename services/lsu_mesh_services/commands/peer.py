@@ -97,6 +97,11 @@ def _schedule(configuration: Configuration, options: argparse.Namespace) -> Sche
 def make_node(configuration: Configuration, options: argparse.Namespace) -> Node:
     """The node of a role and name."""
     name, boot = options.name, secrets.token_hex(8)
+    if configuration.instances is not None:
+        from lsu_mesh.mesh.nodes.bank_nodes import bank_node
+
+        schedule = _schedule(configuration, options) if options.role == "plant" else None
+        return bank_node(configuration, options.role, name, boot, schedule=schedule)
     if options.role in ("plant", "sensor"):
         schedule = _schedule(configuration, options)
         if options.role == "plant":

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
-from lsu_mesh.mesh.access import PUBLISHES
+from lsu_mesh.mesh.access import published_topics
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Health
 from lsu_mesh.mesh.nodes.node import SECOND
@@ -72,8 +72,9 @@ def main(options: argparse.Namespace) -> int:
 
 
 def _watch(configuration: Configuration, options: argparse.Namespace) -> int:
-    main_topics = [(PUBLISHES[role][-1], name) for role, name in configuration.peers() if PUBLISHES[role]]
-    if not configuration.base_model.input_count and configuration.plant is not None:
+    listed = [(published_topics(configuration, role, name), name) for role, name in configuration.peers()]
+    main_topics = [(topics[-1], name) for topics, name in listed if topics]
+    if not configuration.base_model.input_count and configuration.plant is not None and configuration.instances is None:
         main_topics.append(("truth", configuration.plant.name))
     health = [("health", name) for _, name in configuration.peers()]
     with watching(configuration, options) as watch:

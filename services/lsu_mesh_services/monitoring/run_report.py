@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lsu_mesh.mesh.access import recorded_topics
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config.settings import Configuration
-from lsu_mesh.mesh.messages import TYPES, Event, Health, Message, Posterior, Truth
+from lsu_mesh.mesh.messages import Event, Health, Message, Posterior, Truth
 from lsu_mesh.mesh.processes import Processes, words_of
 
 KEPT_STEPS, KEPT_TRUTHS = 8192, 65536
@@ -121,7 +122,7 @@ class RunReport:
 
     def __init__(self, configuration: Configuration) -> None:
         self.configuration = configuration
-        self._gate = Admission(configuration, TYPES)
+        self._gate = Admission(configuration, recorded_topics(configuration))
         self._truth: dict[int, list[float]] = {}
         self.tracks = {name: Track("filter", settings.kind) for name, settings in configuration.filters.items()}
         self.tracks |= {name: Track("fusion", "fusion") for name in configuration.fusion}

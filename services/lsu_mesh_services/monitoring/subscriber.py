@@ -9,10 +9,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import NamedTuple
 
+from lsu_mesh.mesh.access import recorded_topics
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.keys import key, parse
-from lsu_mesh.mesh.messages import TYPES, Message
+from lsu_mesh.mesh.messages import Message
 from lsu_mesh.mesh.nodes.node import SECOND
 from lsu_mesh_services.bus import Bus, Clock
 from lsu_mesh_services.configuration import load_or_explain
@@ -47,7 +48,7 @@ class Watch:
     def __init__(self, configuration: Configuration, bus: Bus, clock: Clock, stop: Stop | None) -> None:
         self.clock = clock
         endless = replace(configuration, mesh=replace(configuration.mesh, steps=None))
-        self.admission = Admission(endless, TYPES)
+        self.admission = Admission(endless, recorded_topics(configuration))
         """Takes steps beyond the configuration's last: the mesh may have been started with another one."""
         self._mesh, self._bus, self._stop = configuration.mesh.name, bus, stop
 

@@ -11,6 +11,7 @@ import rerun.blueprint as rrb
 
 from lsu_mesh_services.recording import frame
 from lsu_mesh_services.recording.bands import outline
+from lsu_mesh_services.recording.banks import SHOWN
 from lsu_mesh_services.recording.entity_paths import EntityPaths, Output, path
 from lsu_mesh_services.recording.timeline import SIM_TIME, STEP
 
@@ -31,14 +32,7 @@ Part = rrb.View | rrb.Container
 
 def blueprint(names: EntityPaths) -> rrb.Blueprint:
     """The default blueprint of a mesh."""
-    configuration = names.configuration
-    tabs: list[Part] = [_overview(names)]
-    if len(names.states) > OVERVIEW_STATES:
-        tabs.append(_grid("States", [_bands(names, i) for i in range(len(names.states))]))
-    tabs += [_filter(names, name, settings.kind) for name, settings in configuration.filters.items()]
-    tabs += [_fusion(names, name) for name in configuration.fusion]
-    tabs += [_grid("Outputs", [_output(names, output) for output in names.outputs])]
-    tabs += [_half_widths(names)] if names.learners else []
+    tabs = _of_single_targets(names) if names.configuration.instances is None else _of_banks(names)
     tabs += [_mesh(names), _events()]
     return rrb.Blueprint(
         rrb.Tabs(*tabs, active_tab=0),
@@ -48,6 +42,36 @@ def blueprint(names: EntityPaths) -> rrb.Blueprint:
         auto_views=False,
         auto_layout=False,
     )
+
+
+def _of_single_targets(names: EntityPaths) -> list[Part]:
+    configuration = names.configuration
+    tabs: list[Part] = [_overview(names)]
+    if len(names.states) > OVERVIEW_STATES:
+        tabs.append(_grid("States", [_bands(names, i) for i in range(len(names.states))]))
+    tabs += [_filter(names, name, settings.kind) for name, settings in configuration.filters.items()]
+    tabs += [_fusion(names, name) for name in configuration.fusion]
+    tabs += [_grid("Outputs", [_output(names, output) for output in names.outputs])]
+    return [*tabs, _half_widths(names)] if names.learners else tabs
+
+
+def _of_banks(names: EntityPaths) -> list[Part]:
+    """Widths and statuses of all targets, and a tab for each of the few targets that are drawn."""
+    configuration = names.configuration
+    count = 0 if configuration.instances is None else configuration.instances.count
+    peers = names.estimators
+    widths = [_whole(names, f"{peer}: mean widths of {count} targets", [path("bank_widths", peer)]) for peer in peers]
+    counts = [_whole(names, f"{peer}: targets, by status", [path("bank_counts", peer)]) for peer in peers]
+    plots = [plot for pair in zip(widths, counts, strict=True) for plot in pair]
+    tabs: list[Part] = [rrb.Grid(*plots, grid_columns=2, name="Banks")]
+    seen = "the truth (pink) and its bounds" if names.truth_is_known else "its bounds"
+    for target in range(min(SHOWN, count)):
+        views = [
+            _plot(names, f"{names.label(i)}: {seen}", [f"{path('targets', str(target), state)}/**"])
+            for i, state in enumerate(names.states)
+        ]
+        tabs.append(_grid(f"Target {target}", views))
+    return tabs
 
 
 def _overview(names: EntityPaths) -> Part:

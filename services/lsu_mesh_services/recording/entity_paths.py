@@ -22,6 +22,9 @@
 ``/half_widths/rho/<state>/<peer>``          half-widths of the disturbance, and
 ``/half_widths/r/<sensor>/<output>/<peer>``  of a sensor's noise: in force at a filter, or suggested by an identifier
 ``/factor/<identifier>``                     by what the half-widths in force must be multiplied to explain the data
+``/bank_widths/<peer>``                      quantiles of the mean widths of all targets of a bank
+``/bank_counts/<peer>``                      how many of its targets are inconsistent, how many restarted
+``/targets/<i>/<state>/bands/<peer>``        interval of a target that is shown, ``…/truth`` its true state
 ``/latency/<peer>``                          age of the oldest measurement at the arrival of the posterior, in ms
 ===========================================  =======================================================================
 """

@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import pyarrow as pa
 
+from lsu_mesh.mesh.access import recorded_topics
 from lsu_mesh.mesh.admission import Admission
 from lsu_mesh.mesh.config import Configuration, ConfigurationError, load_values
-from lsu_mesh.mesh.messages import TYPES, Message
+from lsu_mesh.mesh.messages import Message
 from lsu_mesh_services.recording.chunks import Damage, raw_rows
 from lsu_mesh_services.recording.container import ARROW, Frame, batch_of, fields_of, frames, is_about
 from lsu_mesh_services.recording.raw import description_checksum
@@ -65,7 +66,7 @@ def read_recording(path: Path) -> Recording:
         check_recording(file)
     description = read_description(*files)
     configuration = recorded_configuration(path, description)
-    admission = Admission(configuration, TYPES)
+    admission = Admission(configuration, recorded_topics(configuration))
     received, damaged = [], []
     for raw in read_raw(*files):
         duplicates = admission.duplicates

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+from lsu_mesh.mesh.bank_messages import BankSets, BankTruth
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.ledger import Ledger
 from lsu_mesh.mesh.live_times import can_be_true
@@ -25,6 +26,7 @@ from lsu_mesh.mesh.messages import (
     Truth,
 )
 from lsu_mesh_services.recording import palette
+from lsu_mesh_services.recording.banks import BankDrawings
 from lsu_mesh_services.recording.entity_paths import EntityPaths
 from lsu_mesh_services.recording.estimates import Estimates
 from lsu_mesh_services.recording.events import Events
@@ -114,6 +116,7 @@ class Recorder:
         self._space = Sets3D(stream, timelines, names, colors)
         self._outputs = Outputs(stream, timelines, names, colors)
         self._half_widths = HalfWidths(stream, timelines, names, colors)
+        self._banks = BankDrawings(stream, timelines, names, colors)
         self._status = StatusLanes(stream, timelines, configuration)
         self._events = Events(stream, timelines)
         self._topology = Topology(stream, timelines, configuration, colors)
@@ -205,7 +208,7 @@ class Recorder:
             self._stop(f"only {free} bytes are free there")
 
     def _send_drawings(self) -> None:
-        parts = self._estimates, self._space, self._outputs, self._half_widths
+        parts = self._estimates, self._space, self._outputs, self._half_widths, self._banks
         for part in (*parts, self._status, self._events, self._topology):
             self._guarded(f"drawing {type(part).__name__.lower()}", part.flush)
 
@@ -265,7 +268,7 @@ class Recorder:
         self._names.check(message)
         moment = Moment(message.step, arrival_ns)
         self._latest_step = max(self._latest_step, message.step)
-        if isinstance(message, Posterior | Truth | Measurement):
+        if isinstance(message, Posterior | Truth | Measurement | BankSets | BankTruth):
             self._draw_departures(arrival_ns, GOING_ON_NS)
         if isinstance(message, Posterior):
             self._estimates.add(message, arrival_ns)
@@ -283,6 +286,10 @@ class Recorder:
             self._outputs.add_measurement(message, arrival_ns)
         elif isinstance(message, Prediction):
             self._outputs.add_prediction(message, arrival_ns)
+        elif isinstance(message, BankSets):
+            self._banks.add(message, arrival_ns)
+        elif isinstance(message, BankTruth):
+            self._banks.add_truth(message, arrival_ns)
         elif isinstance(message, Health):
             self._status.add_health(message, self._now(arrival_ns))
         elif isinstance(message, Event):

@@ -15,7 +15,7 @@ from lsu_mesh.mesh.config.ros2 import KEYS as ROS2_KEYS
 
 OPTION = re.compile(r"^# (\w+ = .*)$", re.MULTILINE)
 EXCLUSIVE = {"sensors.s3.step", "sensors.s3.time", "sensors.s3.file", "sensors.s3.columns", "plant.file",
-             "plant.columns", "plant.step", "plant.time", "filters.window.E",
+             "plant.columns", "plant.step", "plant.time", "filters.window.E", "filters.box.instances",
              *(f"sensors.s1.{key}" for key in ROS2_KEYS),
              *(f"{table}.{key}" for table in ("sensors.s3", "plant") for key in KEYS)}  # fmt: skip
 """Options that stand beside another one in the example, so that both cannot be on."""
@@ -104,6 +104,7 @@ def test_the_commented_values_are_the_defaults(example: Path, tmp_path: Path) ->
             "noise_map",
             "adopt",
             "publish",
+            "instances",
             *ROS2_KEYS,
             *KEYS,
         )

@@ -62,6 +62,7 @@ TAKEN: dict[str, set[str]] = {
     "network.ros2.connect": {"empty list"}, "network.ros2.listen": {"empty list"},
     "network.ros2.domain_id": {"whole", "zero"}, "network.ros2.publish": {"empty list"},
     "network.ros2.publish[0].frame_id": TEXT, "network.ros2.publish[0].diagnostics": FLAG,
+    "sensors.s1.faults[0].instances": {"empty list"},
     "supervisor.restart": FLAG, "supervisor.limit": {"whole", "zero"},
 }  # fmt: skip
 """What each key takes of ``VALUES``; a key that is not here takes none of them."""
