@@ -7,16 +7,13 @@ import socket
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Event, Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
-from lsu_mesh.mesh.nodes.estimator import Estimator
-from lsu_mesh.mesh.nodes.filter import FilterNode
-from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import OK, USAGE
@@ -25,6 +22,10 @@ from lsu_mesh_services.network.gap_recovery import GapRecovery
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
+
+if TYPE_CHECKING:
+    from lsu_mesh.mesh.nodes.estimator import Estimator
+    from lsu_mesh.mesh.nodes.fusion import FusionNode
 
 LOOK_AT_LINKS_NS = 100_000_000
 STANDSTILL_NS = 1_000_000_000
@@ -132,13 +133,21 @@ class Peer:
         self._bus.subscribe_live(key(self._mesh, "health", self._node.name))  # another process of the own name
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", self._node.name))
-        if isinstance(self._node, FilterNode):
-            self._bus.ask(last_key(self._mesh, self._node.name))
+        if self._node.role in ("filter", "fusion"):
+            self._declare_estimator()
+
+    def _declare_estimator(self) -> None:
+        """Questions and answers of filters and fusions, whose modules the other peers do not load."""
+        from lsu_mesh.mesh.nodes.estimator import Estimator
+        from lsu_mesh.mesh.nodes.fusion import FusionNode
+
+        assert isinstance(self._node, Estimator)
         if isinstance(self._node, FusionNode):
             for name in self._node.sources:
                 self._answer_last(self._node, name)
-        if isinstance(self._node, Estimator):
-            self._answer_latest(self._node)
+        else:
+            self._bus.ask(last_key(self._mesh, self._node.name))
+        self._answer_latest(self._node)
 
     def _answer_last(self, node: FusionNode, name: str) -> None:
         def answers() -> tuple[str, bytes, str] | None:
@@ -150,7 +159,7 @@ class Peer:
         self._bus.answer(last_key(self._mesh, name), answers)
 
     def _answer_latest(self, node: Estimator) -> None:
-        topic = "fused" if isinstance(node, FusionNode) else "posterior"
+        topic = "fused" if node.role == "fusion" else "posterior"
         own_key = key(self._mesh, topic, node.name)
 
         def latest() -> tuple[str, bytes, str] | None:
