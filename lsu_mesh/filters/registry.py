@@ -15,10 +15,13 @@ import difflib
 import functools
 import importlib
 import inspect
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 FILTERS: dict[str, str] = {
     "Kalman": "lsu_mesh.filters.kalman",
@@ -66,6 +69,8 @@ def filter_class(kind: str) -> type[Filter]:
 @functools.cache
 def _installed() -> dict[str, tuple[EntryPoint, ...]]:
     """Entry points of installed packages by name."""
+    from importlib.metadata import entry_points
+
     points: dict[str, tuple[EntryPoint, ...]] = {}
     for point in entry_points(group=ENTRY_POINTS):
         points[point.name] = (*points.get(point.name, ()), point)

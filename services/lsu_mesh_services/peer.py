@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Collection, Iterable
 from contextlib import AbstractContextManager, nullcontext
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from lsu_mesh.mesh.access import taken_predictions
 from lsu_mesh.mesh.config import Configuration
@@ -16,13 +16,7 @@ from lsu_mesh.mesh.duplicate_process import DUPLICATE_PROCESS
 from lsu_mesh.mesh.keys import key, last_key, model_key, parse
 from lsu_mesh.mesh.messages import Event, Message, encode, encoding
 from lsu_mesh.mesh.model_answer import encode_model, model_answer
-from lsu_mesh.mesh.nodes.bank_filter import BankFilterNode
-from lsu_mesh.mesh.nodes.bank_fusion import BankFusionNode
-from lsu_mesh.mesh.nodes.estimator import Estimator
-from lsu_mesh.mesh.nodes.filter import FilterNode
-from lsu_mesh.mesh.nodes.fusion import FusionNode
 from lsu_mesh.mesh.nodes.node import Node
-from lsu_mesh_services.bank_answers import BankAnswers
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.exit_codes import OK, USAGE
 from lsu_mesh_services.mesh_start import MeshStart, moment_text
@@ -30,6 +24,10 @@ from lsu_mesh_services.network.processor_need import ProcessorNeed, Reading
 from lsu_mesh_services.network.receive_queue import Arrival
 from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
+
+if TYPE_CHECKING:
+    from lsu_mesh.mesh.nodes.estimator import Estimator
+    from lsu_mesh.mesh.nodes.fusion import FusionNode
 
 LOOK_AT_LINKS_NS = 100_000_000
 STANDSTILL_NS = 1_000_000_000
@@ -149,6 +147,23 @@ class Peer:
         self._bus.subscribe_live(key(self._mesh, "health", self._node.name))  # another process of the own name
         self._bus.watch_alive(key(self._mesh, "live", "*"))
         self._bus.declare_alive(key(self._mesh, "live", self._node.name))
+        if self._node.role in ("filter", "fusion"):
+            self._declare_estimator()
+
+    def _declare_estimator(self) -> None:
+        """Questions and answers of filters and fusions, whose modules the other peers do not load."""
+        from lsu_mesh.mesh.nodes.bank_filter import BankFilterNode
+        from lsu_mesh.mesh.nodes.bank_fusion import BankFusionNode
+        from lsu_mesh.mesh.nodes.estimator import Estimator
+        from lsu_mesh.mesh.nodes.filter import FilterNode
+        from lsu_mesh.mesh.nodes.fusion import FusionNode
+        from lsu_mesh_services.bank_answers import BankAnswers
+
+        self._answer_model()
+        if isinstance(self._node, BankFilterNode | BankFusionNode):
+            BankAnswers(self._node).declare(self._bus)
+            return
+        assert isinstance(self._node, Estimator)
         if isinstance(self._node, FilterNode):
             self._bus.ask(last_key(self._mesh, self._node.name))
             self._node.predicts = self._node.name in taken_predictions(self._node.configuration)
@@ -157,12 +172,7 @@ class Peer:
         if isinstance(self._node, FusionNode):
             for name in self._node.sources:
                 self._answer_last(self._node, name)
-        if isinstance(self._node, Estimator):
-            self._answer_latest(self._node)
-        if isinstance(self._node, BankFilterNode | BankFusionNode):
-            BankAnswers(self._node).declare(self._bus)
-        if isinstance(self._node, Estimator | BankFilterNode | BankFusionNode):
-            self._answer_model()
+        self._answer_latest(self._node)
 
     def _answer_last(self, node: FusionNode, name: str) -> None:
         def answers() -> tuple[str, bytes, str] | None:
@@ -174,7 +184,7 @@ class Peer:
         self._bus.answer(last_key(self._mesh, name), answers)
 
     def _answer_latest(self, node: Estimator) -> None:
-        topic = "fused" if isinstance(node, FusionNode) else "posterior"
+        topic = "fused" if node.role == "fusion" else "posterior"
         own_key = key(self._mesh, topic, node.name)
 
         def latest() -> tuple[str, bytes, str] | None:
@@ -280,7 +290,10 @@ class Peer:
             if self._start.receives(arrival.key, arrival.payload):
                 return []
             return self._node.deliver(self._canonical(arrival.key), arrival.payload, arrival.arrival_ns)
-        if arrival.what in ("listened", "unheard") and isinstance(self._node, Estimator):
+        if arrival.what in ("listened", "unheard"):
+            from lsu_mesh.mesh.nodes.estimator import Estimator
+
+            assert isinstance(self._node, Estimator)
             self._node.predicts = arrival.what == "listened"
             return []
         if arrival.what == "alive":

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple, get_args
 
 from lsu_mesh.errors import ModelError
 from lsu_mesh.filters.filter import Filter, GainOf
-from lsu_mesh.filters.registry import filter_class, filter_kinds
+from lsu_mesh.filters.registry import FILTERS, filter_class, filter_kinds
 from lsu_mesh.mesh.config.bank import read_instance_count
 from lsu_mesh.mesh.config.expected import Expected, Unfit, choice, known_names, nats
 from lsu_mesh.mesh.config.filter_options import FilterOptions, try_options
@@ -37,11 +38,16 @@ class Kind(NamedTuple):
 
 def kind_of(table: Table) -> Kind:
     """The key ``kind``: a name of the registry, or ``module:Class``."""
-    found = table.read("kind", REQUIRED, Expected(f'{_KINDS.words}, or "module:Class"', _as_kind))
+    is_ours = table.values.get("kind") in list(FILTERS)
+    words = "a kind of filter" if is_ours else f'{_kinds().words}, or "module:Class"'
+    found = table.read("kind", REQUIRED, Expected(words, _as_kind))
     return found if isinstance(found, Kind) else Kind("", None)
 
 
-_KINDS = choice(filter_kinds())
+@functools.cache
+def _kinds() -> Expected[str]:
+    """All kinds; those of installed packages are looked for only when a kind is none of ours."""
+    return choice(filter_kinds())
 
 
 def _as_kind(value: Any) -> Kind:
@@ -51,7 +57,7 @@ def _as_kind(value: Any) -> Kind:
         return Kind(value, filter_class(value))
     except ModelError as error:
         if ":" not in value:
-            _KINDS.convert(value)
+            _kinds().convert(value)
         raise Unfit(text=str(error)) from None
 
 
