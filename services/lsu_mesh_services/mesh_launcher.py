@@ -35,6 +35,8 @@ LIVE_LEAD_S = 2.0
 """So long after the launch t_0 of a mesh lies that starts now: its prior is of that moment."""
 MAX_AT_ONCE = 1024
 """Messages that are processed before the children and the stop flag are checked again, however many more wait."""
+BATCH_S = 0.05
+"""So long more is waited for, once something has come: the table is made at the end, from the times of arrival."""
 QUIET_S = 4.0
 """The run is over when the sources have ended and no new message has arrived for so long."""
 
@@ -103,6 +105,8 @@ class Run:
             arrival = self.bus.next(0 if taken else timeout)
             if arrival is None:
                 break
+            if not taken and self.player is None:
+                time.sleep(BATCH_S)
             self._take(arrival)
         if self.viewer is not None and (words := self.viewer.end_words()):
             self.record(words)

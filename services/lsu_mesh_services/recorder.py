@@ -33,6 +33,8 @@ AFTER_STOP_S = 0.5
 """How long the recorder still receives messages, at most, after it was asked to stop."""
 QUIET_S = 0.2
 """When no message has arrived for so long, none is under way."""
+BATCH_S = 0.02
+"""So long the recorder waits for more, once something has come: messages are recorded together, on fewer wake-ups."""
 MAX_AT_ONCE = 2048
 """Messages that are recorded before the recorder checks the stop flag and the time again."""
 
@@ -174,6 +176,8 @@ class RecorderService:
         """Record what has come, waiting for the first of it so many seconds; returns how much it was."""
         taken = 0
         while taken < most and (arrival := self._bus.next(0.0 if taken else patience)) is not None:
+            if not taken and patience:
+                time.sleep(BATCH_S)
             self._take(arrival)
             taken += 1
         return taken
