@@ -39,6 +39,8 @@ MAX_AT_ONCE = 1024
 """Messages that are processed before the children and the stop flag are checked again, however many more wait."""
 START_ORDER = ("recorder", "plant", "sensor", "identifier", "fusion", "filter")
 """The recorder has most to load; before the first estimator is forked the kernels are loaded."""
+BATCH_S = 0.05
+"""So long more is waited for, once something has come: the table is made at the end, from the times of arrival."""
 QUIET_S = 4.0
 """The run is over when the sources have ended and no new message has arrived for so long."""
 
@@ -107,6 +109,8 @@ class Run:
             arrival = self.bus.next(0 if taken else timeout)
             if arrival is None:
                 break
+            if not taken and self.player is None:
+                time.sleep(BATCH_S)
             self._take(arrival)
         if self.viewer is not None and (words := self.viewer.end_words()):
             self.record(words)
