@@ -31,6 +31,8 @@ MIB = 2**20
 MAX_GROWTH = 0.02
 """Of a peer's memory from the third quarter of a run to the last, or ``MAX_MIB``, whichever is more."""
 MAX_MIB = 4.0
+DOMAIN = "model.domain={lower=[-100.0,-100.0,-100.0],upper=[100.0,100.0,100.0]}"
+"""From which filters start again behind inputs that they have given up; without one they keep all of them."""
 MAX_CURRENT_S = 2.0
 """From the end of the load until all have done all that there is."""
 MAX_WAIT_S = 60.0
@@ -182,7 +184,7 @@ def quarters(samples: Sequence[float]) -> list[Sequence[float]]:
 
 def soak(folder: Path, overrides: Sequence[str], seconds: float, *, slow: bool = False) -> Report:
     """Run the demo and watch it; ``slow``: a subscriber reads the estimates at a tenth of their rate."""
-    with LiveMesh(folder, overrides, topics=TOPICS, observer=Counting) as mesh:
+    with LiveMesh(folder, [DOMAIN, *overrides], topics=TOPICS, observer=Counting) as mesh:
         observer = mesh.observer
         assert isinstance(observer, Counting)
         mesh.until(lambda: len(observer.newest_estimates()) == len(mesh.estimators()), "estimates flow")

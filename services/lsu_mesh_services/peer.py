@@ -223,6 +223,7 @@ class Peer:
             arrival = self._bus.next(0) if taken < self._node.takes_at_once else None
         self._node.admission.duplicates += self._bus.copies - self._copies
         self._copies = self._bus.copies
+        self._node.is_late = self._bus.waiting() >= self._node.takes_at_once
         self._publish(self._node.work(self._clock.now()))
         self._measure(queued, age_ns, self._clock.now() - began)
 

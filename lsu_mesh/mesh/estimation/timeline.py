@@ -10,6 +10,8 @@ from lsu_mesh.mesh.messages import Input, Measurement, Message
 SECOND = 1_000_000_000
 BEHIND = 32
 """So many complete steps in the queue and intermediate results are no longer published."""
+BEHIND_LATE = 4
+"""The same where more waits in front of the node."""
 INPUT_LOST = 256
 """So many later inputs have come, and so many that their publisher keeps no more of them: this one does not come."""
 MAX_STEPS = 4096
@@ -46,6 +48,8 @@ class Timeline:
         self._max_steps = max(MAX_STEPS, 2 * configuration.cached)
         self._newest_input = self._lost_before = 0
         self._gives_up_inputs = False
+        self.is_late = False
+        """Whether more has come than is known here."""
         self._acts_late = configuration.input_delay_ns > 0
         self._dirty: int | None = None
         self._saw_box: dict[int, set[int]] = {}
@@ -119,7 +123,7 @@ class Timeline:
     def is_behind(self) -> bool:
         """Whether so many steps are waiting that intermediate results are no use to anybody."""
         assert self.current is not None
-        return self.arrivals.newest - self.current > BEHIND
+        return self.arrivals.newest - self.current > (BEHIND_LATE if self.is_late else BEHIND)
 
     def has_input(self, k: int) -> bool:
         """Whether the input of step k has come."""

@@ -162,6 +162,7 @@ class Estimator(StartingNode):
         return found
 
     def advance(self, now: int) -> Iterator[Message]:
+        self.timeline.is_late = self.is_late
         dirty = self.timeline.take_dirty()
         if dirty is not None:
             self._rewind(dirty)

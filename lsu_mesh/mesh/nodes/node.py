@@ -68,8 +68,11 @@ class Node(ABC):
     role: ClassVar[str]
     publishes: tuple[str, ...] = ()
     """Topics that the node publishes, besides health and events."""
-    takes_at_once: ClassVar[int] = 2048
-    """Messages that the service around the node hands over before the next tick, however many more are waiting."""
+    takes_at_once: ClassVar[int] = 256
+    """Messages that the service around the node hands over before the next tick, however many more are waiting: few,
+    so that a backlog stays in the queue, which knows its age."""
+    is_late: bool = False
+    """Whether more than that waits; the service around the node tells."""
     messages_per_step: int = 1
     """Messages of a step under one key at most, as far as the node knows."""
     needs_all_inputs: bool = False

@@ -23,16 +23,20 @@ def test_a_peer_at_half_of_what_it_needs_waits_for_no_more_than_is_kept_and_name
     configuration: Configuration,
 ) -> None:
     mesh = VirtualMesh(configuration, RATE, capacity=1.5 * RATE)
-    mesh.run(60.0)
-    assert mesh.longest_wait <= mesh.kept_ns
+    mesh.run(20.0)
+    assert SECOND < mesh.longest_wait <= mesh.kept_ns
+    mesh.longest_wait = 0
+    mesh.run(40.0)
     assert mesh.queue.is_late
-    mesh.capacity *= 4
+    assert mesh.longest_wait <= 1.1 * SECOND, "once it is late, it stays near the present"
+    mesh.rate /= 4
     mesh.longest_wait = 0
     mesh.run(2.0)
     assert not mesh.queue.is_late, "the load is over, and within 2 s the peer is current"
     mesh.longest_wait = 0
     mesh.run(10.0)
     assert mesh.longest_wait < SECOND // 10
+    mesh.run(1.0, sends=False)
     truth = mesh.missing()
     assert len(truth) > 5000
     assert sorted(mesh.named()) == sorted(truth), "each is named once, and nothing else"
