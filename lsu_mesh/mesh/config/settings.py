@@ -207,14 +207,15 @@ class IdentifierSettings:
 
 @dataclass(frozen=True)
 class RecorderSettings:
-    """``[recorder]``; ``path`` may hold ``{mesh}`` and ``{time}``."""
+    """``[recorder]``; ``path`` may hold ``{mesh}`` and ``{time}``; a part has bytes and seconds, 0: without limit."""
 
     path: str = "runs/{mesh}-{time}.rrd"
     flush: float = 1.0
     mesh_hz: float = 10.0
     axes: tuple[str, ...] = ()
     draw_hz: float = 10.0
-    """Steps of which numbers are drawn, per second; raw payloads are kept of every step."""
+    part_size: int = 10**9
+    part_time: float = 3600.0
 
 
 @dataclass(frozen=True)
