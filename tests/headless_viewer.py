@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from lsu_mesh_services.recording.repair import quiet_environment
+from lsu_mesh_services.recording.rerun_programs import quiet_environment
 from rerun.experimental import ViewerClient
 
 VULKAN_DRIVERS = ("/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d")

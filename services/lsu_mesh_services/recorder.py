@@ -25,8 +25,8 @@ from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK
 from lsu_mesh_services.mesh_start import MeshStart
 from lsu_mesh_services.network.processor_need import ProcessorNeed, Reading
 from lsu_mesh_services.network.receive_queue import Arrival
+from lsu_mesh_services.recording.part_files import next_part
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.stream import next_part
 from lsu_mesh_services.session import connection_report
 from lsu_mesh_services.stop import Stop
 

@@ -10,7 +10,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from lsu_mesh_services.recording.repair import quiet_environment
+from lsu_mesh_services.recording.rerun_programs import quiet_environment
 
 LOOPBACK = "127.0.0.1"
 

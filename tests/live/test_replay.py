@@ -10,7 +10,8 @@ import msgpack
 import numpy as np
 import pytest
 from local_mesh import LocalMesh
-from lsu_mesh_services.recording.read import RawMessage, parts, read_raw, read_recording
+from lsu_mesh_services.recording.part_files import parts
+from lsu_mesh_services.recording.read import RawMessage, read_raw, read_recording
 from recorded_mesh import record
 from waiting import until
 

@@ -22,6 +22,8 @@ WHOLE_LIMIT = 2**53
 SHOWN_LENGTH = 60
 _DURATION = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*(us|ms|s|min)")
 _UNIT_SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0}
+_SIZE = re.compile(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)\s*(kB|MB|GB)")
+_UNIT_BYTES = {"kB": 10**3, "MB": 10**6, "GB": 10**9}
 _SPAN = re.compile(r"([0-9]{1,18}(?:\.[0-9]{1,18})?)\s*(ns|us|ms|s|min)")
 _UNIT_NS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9}
 MAX_NS = 2**62
@@ -201,6 +203,14 @@ def duration(low: float = 0.0) -> Expected[float]:
     return Expected(f'a duration of at least {low:g} s such as "50ms", "0.2s" or "1min"', convert)
 
 
+def as_size(value: Any) -> int:
+    """A size such as "500MB", in bytes."""
+    match = _SIZE.fullmatch(value) if isinstance(value, str) else None
+    if match is None:
+        raise Unfit(f'write "{value}MB" if megabytes are meant' if is_number(value) else "")
+    return int(Fraction(match[1]) * _UNIT_BYTES[match[2]])
+
+
 def span_ns(low: int = 0) -> Expected[int]:
     """A time such as "5ms", or a number of seconds, in whole nanoseconds; nothing is rounded."""
 
@@ -243,6 +253,7 @@ def known_names(known: Iterable[str], sentence: str) -> Expected[str]:
     return Expected(f"one of {listed}" if names else "a name that is defined", convert)
 
 
+SIZE = Expected('a size such as "500MB" or "2GB"', as_size)
 FLAG = Expected("true or false", as_flag)
 TEXT = Expected("a string that is not empty", as_text)
 STRING = Expected("a string", as_string)

@@ -248,9 +248,11 @@ def _read_recorder(root: Table) -> RecorderSettings:
     mesh_hz = table.number("mesh_hz", RecorderSettings.mesh_hz, above=0.0)
     axes = tuple(table.texts("axes", []))
     draw_hz = table.number("draw_hz", RecorderSettings.draw_hz, above=0.0)
+    part_size = table.size("part_size", RecorderSettings.part_size)
+    part_time = table.duration("part_time", RecorderSettings.part_time)
     predictions = table.flag("predictions", RecorderSettings.predictions)
     table.finish()
-    return RecorderSettings(path, flush, mesh_hz, axes, draw_hz, predictions)
+    return RecorderSettings(path, flush, mesh_hz, axes, draw_hz, part_size, part_time, predictions)
 
 
 def _read_supervisor(root: Table) -> SupervisorSettings:

@@ -211,16 +211,16 @@ class IdentifierSettings:
 
 @dataclass(frozen=True)
 class RecorderSettings:
-    """``[recorder]``; ``path`` may hold ``{mesh}`` and ``{time}``."""
+    """``[recorder]``; ``path`` may hold ``{mesh}`` and ``{time}``; a part has bytes and seconds, 0: without limit."""
 
     path: str = "runs/{mesh}-{time}.rrd"
     flush: float = 1.0
     mesh_hz: float = 10.0
     axes: tuple[str, ...] = ()
     draw_hz: float = 10.0
-    """Steps of which numbers are drawn, per second; raw payloads are kept of every step."""
+    part_size: int = 10**9
+    part_time: float = 3600.0
     predictions: bool = False
-    """Whether predictions that no filter takes are recorded too, and so computed at all."""
 
 
 @dataclass(frozen=True)

@@ -80,6 +80,11 @@ class Table:
         """A time such as "50ms" in seconds."""
         return self.read(key, default, expected.duration(low))
 
+    def size(self, key: str, default: int) -> int:
+        """A size such as "500MB" in bytes."""
+        found: int = self.read(key, default, expected.SIZE)
+        return found
+
     def vector(self, key: str, default: Any = REQUIRED) -> Any:
         """A list of finite numbers."""
         return self.read(key, default, expected.VECTOR)

@@ -41,7 +41,7 @@ def _repair(options: argparse.Namespace) -> int:
 
 
 def _merge(options: argparse.Namespace) -> int:
-    from lsu_mesh_services.recording.read import parts
+    from lsu_mesh_services.recording.part_files import parts
 
     files = [Path(name) for name in options.files]
     if len(files) == 1:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from lsu_mesh_services.exit_codes import COULD_NOT_START, USAGE
 from lsu_mesh_services.extras import RECORD
-from lsu_mesh_services.recording.repair import quiet_environment
+from lsu_mesh_services.recording.part_files import parts
+from lsu_mesh_services.recording.rerun_programs import quiet_environment
 
 MAGIC = (b"RRF2", b"RRF0", b"RRIO")
 
@@ -27,7 +28,7 @@ def main(options: argparse.Namespace) -> int:
         return USAGE
     viewer = Path(sys.executable).parent / "rerun"
     try:
-        return subprocess.call([str(viewer), str(path)], env=quiet_environment())
+        return subprocess.call([str(viewer), *map(str, parts(path))], env=quiet_environment())
     except FileNotFoundError:
         print(f"{viewer} is missing: {RECORD.remedy}", file=sys.stderr)
         return COULD_NOT_START

@@ -25,7 +25,7 @@ from lsu_mesh_services.recording.bands import (
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import TRUTH, Color
 from lsu_mesh_services.recording.thinning import Thinning
-from lsu_mesh_services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines
 
 REMEMBERED = 4096
 """Steps for which a truth waits for sets and sets wait for the truth."""
@@ -58,9 +58,7 @@ class _Error(NamedTuple):
 class Estimates:
     """Collects estimates and truths, joins them by step, and sends them in batches."""
 
-    def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
-    ) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]) -> None:
         self._stream = stream
         self._timelines = timelines
         self._names = names

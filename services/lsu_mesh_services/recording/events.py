@@ -8,13 +8,13 @@ import rerun as rr
 
 from lsu_mesh.mesh.messages import Event
 from lsu_mesh_services.recording.entity_paths import path
-from lsu_mesh_services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines
 
 
 class Events:
     """Collects lines of text and sends them in batches."""
 
-    def __init__(self, stream: rr.RecordingStream, timelines: Timelines) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines) -> None:
         self._stream = stream
         self._timelines = timelines
         self._rows: defaultdict[str, list[tuple[Moment, str, str]]] = defaultdict(list)

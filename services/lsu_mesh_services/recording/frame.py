@@ -13,7 +13,7 @@ import rerun as rr
 from lsu_mesh.array_types import Array
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import OTHER
-from lsu_mesh_services.recording.timeline import Moment, Timelines, one_row
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines, one_row
 
 ALL = "all peers"
 """The frame of views that show several peers; no peer can have this name."""
@@ -34,7 +34,7 @@ def entity(name: str) -> str:
 class Frame:
     """One frame: its centre and scale (3,) each, changed in readable jumps only."""
 
-    def __init__(self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, name: str) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines, names: EntityPaths, name: str) -> None:
         self._stream = stream
         self._timelines = timelines
         self._entity = entity(name)

@@ -15,7 +15,7 @@ from lsu_mesh.mesh.messages import Posterior, Suggestion
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import IDENTIFIER, OTHER, Color
 from lsu_mesh_services.recording.thinning import Thinning
-from lsu_mesh_services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines
 
 POINTS = rr.components.MarkerShape.Diamond
 STEPS = rr.components.InterpolationMode.StepAfter
@@ -30,9 +30,7 @@ class _Told(NamedTuple):
 class HalfWidths:
     """Collects half-widths and sends them in batches."""
 
-    def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
-    ) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]) -> None:
         self._stream = stream
         self._timelines = timelines
         self._names = names

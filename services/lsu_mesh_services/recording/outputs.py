@@ -12,15 +12,13 @@ from lsu_mesh_services.recording.bands import band_columns, band_style
 from lsu_mesh_services.recording.entity_paths import EntityPaths, Output
 from lsu_mesh_services.recording.palette import OTHER, Color
 from lsu_mesh_services.recording.thinning import Thinning
-from lsu_mesh_services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines
 
 
 class Outputs:
     """Collects measurements and output predictions and sends them in batches."""
 
-    def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
-    ) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]) -> None:
         self._stream = stream
         self._timelines = timelines
         self._names = names

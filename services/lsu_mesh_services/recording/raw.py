@@ -23,7 +23,7 @@ import rerun as rr
 
 from lsu_mesh.mesh.keys import parse
 from lsu_mesh_services.recording.entity_paths import path
-from lsu_mesh_services.recording.timeline import Moment, step_columns, wall_column
+from lsu_mesh_services.recording.timeline import Moment, Stream, step_columns, wall_column
 
 ARCHETYPE = "lsu.Raw"
 REFUSED = "/raw/refused"
@@ -90,7 +90,7 @@ def entity_of(key: str) -> str:
 class RawStore:
     """Collects raw payloads and sends them in batches."""
 
-    def __init__(self, stream: rr.RecordingStream) -> None:
+    def __init__(self, stream: Stream) -> None:
         self._stream = stream
         self._entities: dict[str, str] = {}
         self._rows: defaultdict[str, _Rows] = defaultdict(_Rows)

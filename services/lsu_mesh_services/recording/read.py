@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +16,7 @@ from lsu_mesh.mesh.config import Configuration, ConfigurationError, load_values
 from lsu_mesh.mesh.messages import Message
 from lsu_mesh_services.recording.chunks import Damage, raw_rows
 from lsu_mesh_services.recording.container import ARROW, Frame, batch_of, fields_of, frames, is_about
+from lsu_mesh_services.recording.part_files import parts
 from lsu_mesh_services.recording.raw import description_checksum
 
 PROPERTIES = "/__properties/lsu_mesh"
@@ -83,14 +83,6 @@ def read_recording(path: Path) -> Recording:
         damaged=damaged,
         unknown_fields=dict(admission.unknown_fields),
     )
-
-
-def parts(path: Path) -> tuple[Path, ...]:
-    """The file and the parts that a restarted recorder wrote beside it, in their order."""
-    pattern = re.compile(re.escape(path.stem) + r"\.part(\d+)" + re.escape(path.suffix))
-    beside = path.parent.iterdir() if path.parent.is_dir() else ()
-    found = {int(match[1]): file for file in beside if (match := pattern.fullmatch(file.name))}
-    return (path, *(found[number] for number in sorted(found)))
 
 
 def recorded_configuration(path: Path, description: dict[str, str]) -> Configuration:

@@ -32,10 +32,11 @@ from lsu_mesh_services.recording.estimates import Estimates
 from lsu_mesh_services.recording.events import Events
 from lsu_mesh_services.recording.half_widths import HalfWidths
 from lsu_mesh_services.recording.outputs import Outputs
+from lsu_mesh_services.recording.parted_stream import PartedStream
 from lsu_mesh_services.recording.raw import RawStore
 from lsu_mesh_services.recording.sets_3d import Sets3D
 from lsu_mesh_services.recording.status import StatusLanes
-from lsu_mesh_services.recording.stream import open_stream, run_description, send_description
+from lsu_mesh_services.recording.stream import run_description
 from lsu_mesh_services.recording.timeline import Moment, Timelines
 from lsu_mesh_services.recording.timeout import ends_within
 from lsu_mesh_services.recording.topology import Topology
@@ -106,11 +107,11 @@ class Recorder:
         self._names = names = EntityPaths(configuration)
         timelines = Timelines(configuration.mesh.dt)
         colors = palette.colors(configuration)
-        self.path = path
         self._ledger = Ledger()
-        self._described = run_description(configuration) | dict(run_properties)
-        """Written at the beginning and at the end, so that one damaged page does not cost it."""
-        self._stream = stream = open_stream(names, path, self._described, serve_port=serve_port, continues=continues)
+        described = run_description(configuration) | dict(run_properties)
+        self._stream = stream = PartedStream(names, path, described, serve_port=serve_port, continues=continues)
+        self._part_ns: int | None = None
+        """When the part began."""
         self._raw = RawStore(stream)
         self._estimates = Estimates(stream, timelines, names, colors)
         self._space = Sets3D(stream, timelines, names, colors)
@@ -136,6 +137,11 @@ class Recorder:
         self._closed = False
         self.has_ended = True
         """False after :meth:`close` where Rerun hangs: the process should then end without waiting for its threads."""
+
+    @property
+    def path(self) -> Path:
+        """The part that is being written."""
+        return self._stream.path
 
     @property
     def flushed(self) -> dict[str, int]:
@@ -188,6 +194,18 @@ class Recorder:
             if draws:
                 self._next_drawing_ns = now_ns + self._drawing_interval_ns
             self._put(lambda: self._store(draws))
+            self._end_part(now_ns)
+
+    def _end_part(self, now_ns: int) -> None:
+        """Begin a new part when this one is as large or as old as one may be."""
+        settings = self._configuration.recorder
+        began = self._part_ns = now_ns if self._part_ns is None else self._part_ns
+        is_large = settings.part_size and self._size >= settings.part_size
+        is_old = settings.part_time and now_ns - began >= settings.part_time * 1e9
+        if (is_large or is_old) and not self._broken:
+            self._part_ns, self._size = now_ns, 0
+            self._put(lambda: self._store(draws=True))
+            self._guarded("beginning a new part", self._stream.begin_next)
 
     def flush(self) -> None:
         """Write everything that waits to the file."""
@@ -258,7 +276,7 @@ class Recorder:
 
     def _finish(self) -> None:
         self._guarded("drawing space", self._space.finish)
-        self._guarded("describing the run", lambda: send_description(self._stream, self._described))
+        self._guarded("describing the run", self._stream.describe)
         self._store(draws=True)
 
     def _disconnect(self) -> None:

@@ -38,6 +38,7 @@ from lsu_mesh_services.recording.container import (
 )
 from lsu_mesh_services.recording.losses import Loss, Losses
 from lsu_mesh_services.recording.raw import entity_of, raw_columns
+from lsu_mesh_services.recording.rerun_programs import quiet_environment
 from lsu_mesh_services.recording.timeline import Moment, step_columns, wall_column
 
 KINDS = {"rerun.archetypes": archetypes, "rerun.blueprint.archetypes": blueprint_archetypes}
@@ -186,8 +187,3 @@ def _optimize(sources: Sequence[Path], made: Path) -> str:
     command = [str(Path(sys.executable).with_name("rerun")), "rrd", "optimize", *map(str, sources), "-o", str(made)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=quiet_environment())
     return "" if done.returncode == 0 and made.is_file() else done.stderr.strip()[-500:] or "rerun rrd optimize failed"
-
-
-def quiet_environment() -> dict[str, str]:
-    """The environment for Rerun's programs: no analytics, for which ``CI`` is the only variable that they heed."""
-    return os.environ | {"CI": "1"}

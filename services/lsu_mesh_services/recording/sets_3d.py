@@ -21,7 +21,7 @@ from lsu_mesh_services.recording import frame
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import TRUTH, Color
 from lsu_mesh_services.recording.set_geometry import EMPTY, SetGeometry, body, project, rectangle
-from lsu_mesh_services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines
 
 MAX_PAUSE_NS = 2_000_000_000
 """Bodies that are drawn at least, however slow they are."""
@@ -62,9 +62,7 @@ class _Truth(NamedTuple):
 class Sets3D:
     """Chooses the steps to draw, makes the bodies and sends them in batches."""
 
-    def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
-    ) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]) -> None:
         self._stream = stream
         self._timelines = timelines
         self._axes = names.axes()

@@ -15,7 +15,7 @@ from lsu_mesh.mesh.config import Configuration
 from lsu_mesh.mesh.messages import Fused, Health, Posterior
 from lsu_mesh_services.recording.entity_paths import path
 from lsu_mesh_services.recording.palette import HEALTH, STATUS, TRUST, Color
-from lsu_mesh_services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines
 
 GONE = "gone"
 
@@ -23,7 +23,7 @@ GONE = "gone"
 class StatusLanes:
     """Collects changes of status and sends them in batches."""
 
-    def __init__(self, stream: rr.RecordingStream, timelines: Timelines, configuration: Configuration) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines, configuration: Configuration) -> None:
         self._stream = stream
         self._timelines = timelines
         self._sources = {name: set(fusion.sources) for name, fusion in configuration.fusion.items()}

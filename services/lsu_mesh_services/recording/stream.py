@@ -30,33 +30,42 @@ MAX_INDEXED_S = 300.0
 PACKAGES = ("lsu-mesh", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba", "rerun-sdk")
 
 
-def open_stream(
-    names: EntityPaths,
-    path: Path,
-    described: Mapping[str, str],
-    serve_port: int | None = None,
-    continues: Path | None = None,
-) -> rr.RecordingStream:
-    """A stream into a new file, and to viewers on ``serve_port`` of the loopback where it is given.
+def open_file(names: EntityPaths, path: Path, described: Mapping[str, str], identifier: str) -> rr.RecordingStream:
+    """A stream into a new file; ``described`` tells of the run.
 
-    ``described`` tells of the run, ``continues`` is an earlier part of the same recording. Raises ``OSError`` where the
-    file exists or cannot be made; a folder that is missing is made.
+    Raises ``OSError`` where the file exists or cannot be made; a folder that is missing is made.
     """
     _claim(path)
-    rr.set_strict_mode(True)  # an error is an exception, which the recorder counts; else data vanish with a warning
-    configuration = names.configuration
-    stream = rr.RecordingStream(
-        application_id(configuration),
-        recording_id=(continues and recording_id(continues)) or f"{configuration.mesh.name}-{os.urandom(8).hex()}",
-        batcher_config=rr.ChunkBatcherConfig(flush_tick=configuration.recorder.flush),
-    )
-    sinks: list[rr.FileSink | rr.GrpcServerSink] = [rr.FileSink(path, write_footer=_is_short(configuration))]
-    if serve_port is not None:
-        sinks.append(rr.GrpcServerSink(bind_ip="127.0.0.1", port=serve_port, server_memory_limit="256MB"))
-    stream.set_sinks(*sinks, default_blueprint=blueprint(names))
-    stream.send_recording_name(f"{configuration.mesh.name} {path.stem}")
+    stream = _new_stream(names, identifier)
+    sink = rr.FileSink(path, write_footer=_is_short(names.configuration))
+    stream.set_sinks(sink, default_blueprint=blueprint(names))
+    stream.send_recording_name(f"{names.configuration.mesh.name} {path.stem}")
     send_description(stream, described)
     return stream
+
+
+def open_server(names: EntityPaths, identifier: str, port: int) -> rr.RecordingStream:
+    """A stream to viewers, who come to ``port`` of the loopback."""
+    stream = _new_stream(names, identifier)
+    sink = rr.GrpcServerSink(bind_ip="127.0.0.1", port=port, server_memory_limit="256MB")
+    stream.set_sinks(sink, default_blueprint=blueprint(names))
+    stream.send_recording_name(names.configuration.mesh.name)
+    return stream
+
+
+def new_identifier(configuration: Configuration) -> str:
+    """The name of a new recording, by which its parts belong together."""
+    return f"{configuration.mesh.name}-{os.urandom(8).hex()}"
+
+
+def _new_stream(names: EntityPaths, identifier: str) -> rr.RecordingStream:
+    rr.set_strict_mode(True)  # an error is an exception, which the recorder counts; else data vanish with a warning
+    configuration = names.configuration
+    return rr.RecordingStream(
+        application_id(configuration),
+        recording_id=identifier,
+        batcher_config=rr.ChunkBatcherConfig(flush_tick=configuration.recorder.flush),
+    )
 
 
 def send_description(stream: rr.RecordingStream, described: Mapping[str, str]) -> None:
@@ -89,15 +98,6 @@ def application_id(configuration: Configuration) -> str:
     kinds = [(one.kind, one.sensors, one.transfer) for one in configuration.filters.values()]
     digest = hashlib.blake2b(json.dumps([peers, kinds]).encode(), digest_size=4).hexdigest()
     return f"lsu-mesh {configuration.mesh.name} {digest}"
-
-
-def next_part(path: Path) -> Path:
-    """``path`` where it is free, else the first free one of ``NAME.part2.rrd``, ``NAME.part3.rrd``, …"""
-    part, number = path, 1
-    while part.exists():
-        number += 1
-        part = path.with_name(f"{path.stem}.part{number}{path.suffix}")
-    return part
 
 
 def run_description(configuration: Configuration) -> dict[str, str]:

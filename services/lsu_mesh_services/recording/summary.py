@@ -20,7 +20,8 @@ from lsu_mesh.mesh.messages import TYPES
 from lsu_mesh.mesh.sequences import Sequence
 from lsu_mesh_services.recording.chunks import Damage, Rows, raw_rows
 from lsu_mesh_services.recording.losses import Loss, Losses, damage_words
-from lsu_mesh_services.recording.read import check_recording, parts, read_description, recorded_configuration
+from lsu_mesh_services.recording.part_files import parts
+from lsu_mesh_services.recording.read import check_recording, read_description, recorded_configuration
 
 ABOUT = ("mesh", "seed", "dt", "model_digest", "lsu_mesh", "rerun_sdk", "numba", "python", "cpu", "replay_of")
 """Properties of the run that are shown."""

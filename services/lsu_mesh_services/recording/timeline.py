@@ -5,15 +5,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import rerun as rr
 
 STEP, SIM_TIME, WALL_TIME = "step", "sim_time", "wall_time"
 LAST_NS = 2**63 - 1
+
+
+class Stream(Protocol):
+    """Where drawings are written."""
+
+    def log(self, entity: str, archetype: rr.AsComponents, *, static: bool) -> None:
+        """Write a style."""
+
+    def send_columns(self, entity: str, times: list[rr.TimeColumn], columns: Iterable[rr.ComponentColumn]) -> None:
+        """Write rows."""
 
 
 class Moment(NamedTuple):

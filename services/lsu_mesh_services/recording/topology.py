@@ -6,7 +6,7 @@ import rerun as rr
 
 from lsu_mesh.mesh.config import Configuration
 from lsu_mesh_services.recording.palette import ABSENT, OTHER, Color
-from lsu_mesh_services.recording.timeline import Moment, Timelines, one_row
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines, one_row
 
 ENTITY = "/topology"
 ROLES = ("plant", "sensor", "filter", "fusion", "identifier", "recorder")
@@ -18,7 +18,7 @@ class Topology:
 
     def __init__(
         self,
-        stream: rr.RecordingStream,
+        stream: Stream,
         timelines: Timelines,
         configuration: Configuration,
         colors: dict[str, Color],

@@ -12,10 +12,10 @@ import pytest
 from headless_viewer import HeadlessViewer, why_not
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from lsu_mesh_services.recording.part_files import next_part
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.repair import repair
-from lsu_mesh_services.recording.stream import next_part
 from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh, written
 
 from lsu_mesh.mesh.config import load

@@ -11,9 +11,9 @@ import pytest
 from local_mesh import LocalMesh
 from lsu_mesh_services.cli import main
 from lsu_mesh_services.exit_codes import FAILURE, OK, USAGE
+from lsu_mesh_services.recording.part_files import next_part
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.stream import next_part
 from lsu_mesh_services.recording.synthetic_mesh import SyntheticMesh, written
 from recorded_mesh import record
 

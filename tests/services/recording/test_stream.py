@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lsu_mesh_services.recording.part_files import next_part
 from lsu_mesh_services.recording.read import read_raw
 from lsu_mesh_services.recording.recorder import Recorder
 from lsu_mesh_services.recording.repair import repair
-from lsu_mesh_services.recording.stream import next_part
 from lsu_mesh_services.recording.synthetic_mesh import Arrival, SyntheticMesh
 from rerun.chunk import RrdReader
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import msgpack
 import pytest
+from lsu_mesh_services.recording.part_files import next_part
 from lsu_mesh_services.recording.read import read_recording
 from lsu_mesh_services.recording.recorder import Recorder
-from lsu_mesh_services.recording.stream import next_part
 from lsu_mesh_services.recording.summary import Summary, summary
 from lsu_mesh_services.recording.synthetic_mesh import START_NS, Arrival, SyntheticMesh, written
 

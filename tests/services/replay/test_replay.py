@@ -13,7 +13,8 @@ import pytest
 from local_mesh import LocalMesh
 from lsu_mesh_services.cli import main
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
-from lsu_mesh_services.recording.read import parts, read_recording
+from lsu_mesh_services.recording.part_files import parts
+from lsu_mesh_services.recording.read import read_recording
 from msgspec import structs
 from recorded_mesh import record
 
