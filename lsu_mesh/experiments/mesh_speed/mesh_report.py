@@ -8,6 +8,9 @@ from typing import Any, NamedTuple
 from lsu_mesh.experiments.mesh_speed.mesh_case import MeshCase
 from lsu_mesh.experiments.mesh_speed.quantiles import Quantiles, quantiles
 
+MAX_LOST = 0.01
+"""A side that loses a larger share of its steps does not keep up."""
+
 
 class Turn(NamedTuple):
     """One run of the relay or of the mesh over the steps that count."""
@@ -58,6 +61,11 @@ class MeshReport(NamedTuple):
             "relay": _side(relay, self.relay),
             "mesh": _side(mesh, self.mesh),
         }
+
+
+def keeps_up(missing: int, steps: int) -> bool:
+    """Whether a side lost so few of its steps that its latencies and costs mean what they say."""
+    return missing <= MAX_LOST * steps
 
 
 def processor_ms_per_step(turns: Sequence[Turn]) -> float | None:

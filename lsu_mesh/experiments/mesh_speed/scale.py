@@ -56,6 +56,8 @@ class Cost:
     count: int
     cost: float
     unit: str
+    kept_up: bool = True
+    """False: processes that lost steps, so that a step costs more than this."""
 
     def line(self) -> dict[str, Any]:
         """What ``--json`` prints and a file of results keeps."""

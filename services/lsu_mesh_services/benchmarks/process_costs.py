@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from lsu_mesh.experiments.mesh_speed.mesh_case import MeshCase
-from lsu_mesh.experiments.mesh_speed.mesh_report import processor_ms_per_step
+from lsu_mesh.experiments.mesh_speed.mesh_report import keeps_up, processor_ms_per_step
 from lsu_mesh.experiments.mesh_speed.scale import PROCESSES, RELAY, Cost
 from lsu_mesh_services.benchmarks.sides import RealMesh
 from lsu_mesh_services.benchmarks.turns import measure_case
@@ -27,5 +27,6 @@ def process_costs(
         report, peers = measure_case(case, turns=1, seconds=seconds, tell=tell), len(RealMesh(case).peers)
         for what, turns in ((PROCESSES, report.mesh), (RELAY, report.relay)):
             cost = processor_ms_per_step(turns)
-            found += [] if cost is None else [Cost(what, peers, cost, UNIT)]
+            steps, missing = (sum(len(turn.latencies_ms) for turn in turns), sum(turn.missing for turn in turns))
+            found += [] if cost is None else [Cost(what, peers, cost, UNIT, keeps_up(missing, steps))]
     return sorted(found, key=lambda cost: cost.what)

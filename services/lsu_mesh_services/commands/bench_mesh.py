@@ -15,8 +15,6 @@ from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
 if TYPE_CHECKING:
     from lsu_mesh.experiments.mesh_speed.mesh_case import MeshCase
 
-MAX_LOST = 0.01
-"""A side that loses a larger share of its steps does not keep up."""
 MIN_SECONDS, MAX_SECONDS, MAX_TURNS = 1.0, 600.0, 100
 
 
@@ -71,9 +69,10 @@ def _measure(
 
 def too_busy(line: dict[str, Any]) -> str:
     """A warning where a side did not keep up with its steps; "" where both did."""
-    lost = {
-        side: line[side]["missing"] for side in ("relay", "mesh") if line[side]["missing"] > MAX_LOST * line["steps"]
-    }
+    from lsu_mesh.experiments.mesh_speed.mesh_report import keeps_up
+
+    counts = {side: line[side]["missing"] for side in ("relay", "mesh")}
+    lost = {side: count for side, count in counts.items() if not keeps_up(count, line["steps"])}
     if not lost:
         return ""
     sides = " and ".join(f"the {side} ({count} of {line['steps']} fused sets missing)" for side, count in lost.items())

@@ -93,7 +93,8 @@ def print_table(costs: Sequence[Cost]) -> None:
         group = [cost for cost in costs if cost.what == what]
         for k, cost in enumerate(group):
             ratio = number(cost.cost / group[0].cost)
-            rows.append((what if k == 0 else "", str(cost.count), number(cost.cost), cost.unit, ratio))
+            unit = cost.unit if cost.kept_up else f"{cost.unit}, steps lost"
+            rows.append((what if k == 0 else "", str(cost.count), number(cost.cost), unit, ratio))
         if len(group) > 1:
             exponents.append(f"{what} {exponent([(float(cost.count), cost.cost) for cost in group]):.2f}")
     console = new_console()

@@ -8,7 +8,7 @@ import pytest
 
 from lsu_mesh.experiments.mesh_speed.bench_kinds import KINDS
 from lsu_mesh.experiments.mesh_speed.mesh_case import MeshCase
-from lsu_mesh.experiments.mesh_speed.mesh_report import MeshReport, Turn, processor_ms_per_step
+from lsu_mesh.experiments.mesh_speed.mesh_report import MeshReport, Turn, keeps_up, processor_ms_per_step
 
 RELAY = [Turn([1.0, 1.0, 2.0, 10.0], 0, 0, 0.004), Turn([1.0, 1.0, 1.0, 1.0], 0, 0, 0.004)]
 MESH = [Turn([2.0, 2.0, 2.0, 30.0], 1, 2, 0.02), Turn([4.0, 4.0, 4.0, 4.0], 0, 1, 0.012)]
@@ -38,3 +38,8 @@ def test_a_system_without_processor_times() -> None:
     line = MeshReport(MeshCase(50.0, 4), turns, MESH).line()
     assert (line["cpu_ratio"], line["relay_cpu_ms_per_step"]) == (None, None)
     assert line["cpu_ms_per_step"] == pytest.approx(4.0)
+
+
+def test_one_step_in_a_hundred_may_be_lost() -> None:
+    assert keeps_up(1, 100)
+    assert not keeps_up(2, 100)

@@ -19,10 +19,17 @@ def test_what_was_measured_stands_beside_what_is_projected() -> None:
     assert "Measured on 2026-11-30, commit 0123abcd: cores 2." in lines
     assert "| 100 | 50 | 100 | measured |" in lines
     assert "| 400 | 200 | 400 | projected |" in lines
-    assert "A line through them: 2 and 0.5 for each process; exponent 0.79." in lines
+    assert "A line: 2 and 0.5 for each process; exponent 0.79." in lines
 
 
 def test_cores_follow_from_the_line() -> None:
     """24 filters are 29 processes: 16.5 ms a step."""
     assert "| 24 | 0.825 | 3.3 | projected |" in page().splitlines()
     assert "| 12 | 0.525 | 2.1 | between measured sizes |" in page().splitlines()
+
+
+def test_a_mesh_that_lost_steps_does_not_bend_the_line() -> None:
+    costs = [*COSTS[:4], Cost(PROCESSES, 25, 3.0, MS, kept_up=False)]
+    lines = scale_page(costs, date="2026-11-30", commit=None, machine={}).splitlines()
+    assert "| 25 | 3 | 0.6 | measured; it lost steps, which cost nothing |" in lines
+    assert "| 24 | 0.825 | 3.3 | projected |" in lines
