@@ -6,6 +6,7 @@ nanosecond, halves to the even one.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -39,7 +40,16 @@ class Grid:
 
     def time_of(self, k: int) -> int:
         """``t_k`` in ns."""
-        return self.start_ns + round(k * self.dt * NS)
+        step, parts = self._step_ns
+        whole, rest = divmod(k * step, parts)
+        is_up = 2 * rest > parts or (2 * rest == parts and whole % 2 == 1)
+        return self.start_ns + whole + is_up
+
+    @functools.cached_property
+    def _step_ns(self) -> tuple[int, int]:
+        """``dt · 10⁹`` as numerator and denominator: whole numbers are ten times as fast as fractions."""
+        step_ns = self.dt * NS
+        return step_ns.numerator, step_ns.denominator
 
     def step_of(self, t_ns: int) -> int:
         """The step k with ``t_{k−1} < t ≤ t_k``."""
