@@ -128,6 +128,8 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("archive",),
         ("provenance_steps", "containment", "recomputed"),
         (REST,),
+        ("comparison",),
+        ("side_by_side",),
         ("verify",),
     ],
     "lsu_mesh.mesh.simulator": [

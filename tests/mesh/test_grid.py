@@ -89,3 +89,8 @@ def test_a_grid_that_nanoseconds_cannot_count_is_refused() -> None:
         Grid(0, Fraction(10**10))
     with pytest.raises(ModelError, match="146 years"):
         Grid(2**62, Fraction(1))
+
+
+@given(st.integers(-(10**6), 10**6), st.fractions(Fraction(1, 10**9), 100, max_denominator=10**12))
+def test_a_time_is_the_fraction_rounded_half_to_even(k: int, dt: Fraction) -> None:
+    assert Grid(7, dt).time_of(k) == 7 + round(k * dt * 10**9)

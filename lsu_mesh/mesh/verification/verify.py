@@ -6,25 +6,17 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
 
-import msgspec
-
-from lsu_mesh.errors import LsuMeshError
 from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.measurement_time import placed
-from lsu_mesh.mesh.messages import Fused, Measurement, Message, Prediction, Refused, Smoothed
-from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
+from lsu_mesh.mesh.messages import Measurement, Message, Refused, Smoothed
+from lsu_mesh.mesh.verification.archive import Archive
 from lsu_mesh.mesh.verification.claims import Claims
+from lsu_mesh.mesh.verification.comparison import Outcome
 from lsu_mesh.mesh.verification.containment import Containment
 from lsu_mesh.mesh.verification.findings import Difference, Missing
 from lsu_mesh.mesh.verification.lineage import Set
-from lsu_mesh.mesh.verification.recompute import (
-    FilterRecomputation,
-    FusionRecomputation,
-    Recomputation,
-)
-from lsu_mesh.mesh.verification.recomputed import Recomputed
+from lsu_mesh.mesh.verification.side_by_side import compared
 
 
 @dataclass
@@ -48,26 +40,36 @@ class Verification:
         return not self.differences and not self.false_claims and not self.containment.misses
 
 
-def verify(configuration: Configuration, messages: Iterable[Message]) -> Verification:
+def verify(configuration: Configuration, messages: Iterable[Message], processes: int = 1) -> Verification:
     """Recompute the sets among ``messages`` (in the order of arrival), compare them, and look for the truth in them.
 
-    ``configuration`` is that of the recorded run.
+    ``configuration`` is that of the recorded run. With ``processes`` > 1 the peers' sets are recomputed side by side,
+    with the same result.
     """
     archive = Archive(_placed(configuration, messages))
-    recomputations: dict[str, Recomputation] = {}
     found = Verification(containment=Containment.of(configuration, archive))
     claims = Claims(configuration, archive)
-    for recorded in archive.sets():
-        recomputation = recomputations.get(recorded.src)
-        if recomputation is None:
-            recomputation = recomputations[recorded.src] = _recomputation(configuration, archive, recorded)
-        recomputed = _check(found, recomputation, recorded)
+    sets = archive.sets()
+    for recorded, outcome in zip(sets, compared(configuration, archive, sets, processes), strict=True):
+        _count(found, recorded, outcome)
         if not isinstance(recorded, Smoothed):  # what one says of itself is its posterior's, and compared with that
-            claims.check_lineage(recorded, recomputed)
+            claims.check_lineage(recorded, outcome.recomputed)
         found.containment.check(recorded, claims.proved_guarantee(recorded))
     claims.check_processes()
     found.false_claims, found.unproved = claims.false, claims.unproved
     return found
+
+
+def _count(found: Verification, recorded: Set | Smoothed, outcome: Outcome) -> None:
+    place = (recorded.src, recorded.topic, recorded.step, recorded.seq)
+    if outcome.missing:
+        found.unverifiable.append(Missing(*place, outcome.missing))
+        if outcome.is_outdated:
+            found.outdated[outcome.missing] += 1
+    elif outcome.different is not None:
+        found.differences.append(Difference(*place, *outcome.different))
+    else:
+        found.exact[recorded.src, recorded.topic] += 1
 
 
 def _placed(configuration: Configuration, messages: Iterable[Message]) -> Iterator[Message]:
@@ -78,63 +80,3 @@ def _placed(configuration: Configuration, messages: Iterable[Message]) -> Iterat
                 yield placed(configuration, message)
         else:
             yield message
-
-
-def _recomputation(configuration: Configuration, archive: Archive, recorded: Message) -> Recomputation:
-    if isinstance(recorded, Fused):
-        return FusionRecomputation(configuration, archive, recorded.name)
-    return FilterRecomputation(configuration, archive, recorded.name)
-
-
-def _check(found: Verification, recomputation: Recomputation, recorded: Set | Smoothed) -> Recomputed | None:
-    """Compare one set; what it is by its provenance, or ``None`` where it cannot be recomputed.
-
-    Equal is a proof, whatever number the arithmetic had. What differs by another arithmetic cannot be recomputed.
-    """
-    place = (recorded.src, recorded.topic, recorded.step, recorded.seq)
-    recomputed: Recomputed | None
-    different: tuple[str, Any, Any] | None
-    try:
-        if isinstance(recorded, Prediction):
-            recomputed = recomputation.prediction(recorded)
-        elif isinstance(recorded, Smoothed):
-            recomputed = recomputation.smoothed(recorded)
-        else:
-            recomputed = recomputation.posterior(recorded)
-        different = next(differences(recorded, recomputed.fields), None)
-    except Unverifiable as reason:
-        found.unverifiable.append(Missing(*place, str(reason)))
-        return None
-    except DoesNotFit as wrong:
-        recomputed, different = None, (wrong.field, wrong.recorded, wrong.expected)
-    except LsuMeshError as error:
-        recomputed, different = None, ("base", "a set of the model", str(error))
-    if different is None:
-        found.exact[recorded.src, recorded.topic] += 1
-        return recomputed
-    other = recomputation.other_algorithm(recorded)
-    if other is None:
-        found.differences.append(Difference(*place, *different))
-        return recomputed
-    found.unverifiable.append(Missing(*place, other))
-    found.outdated[other] += 1
-    return None
-
-
-def differences(recorded: Message, fields: Any) -> Iterator[tuple[str, Any, Any]]:
-    """``(place, recorded, recomputed)`` of every number of ``fields`` that differs, even in the sign of a zero."""
-    for name, value in sorted(fields.items(), key=lambda item: item[0] == "support"):
-        yield from _compare(name, msgspec.to_builtins(getattr(recorded, name)), msgspec.to_builtins(value))
-
-
-def _compare(place: str, old: Any, new: Any) -> Iterator[tuple[str, Any, Any]]:
-    if msgspec.msgpack.encode(old) == msgspec.msgpack.encode(new):
-        return
-    if isinstance(old, dict) and isinstance(new, dict) and old.keys() == new.keys():
-        for key in old:
-            yield from _compare(f"{place}.{key}", old[key], new[key])
-    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        for i, pair in enumerate(zip(old, new, strict=True)):
-            yield from _compare(f"{place}[{i}]", *pair)
-    else:
-        yield place, old, new

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from lsu_mesh.experiments.workers import cores
 from lsu_mesh.mesh.access import truth_is_known
 from lsu_mesh.mesh.verification import Verification, verify
 from lsu_mesh_services.exit_codes import NOT_MET, OK
@@ -47,7 +48,7 @@ class Report:
 def verify_recording(recording: Recording, *, as_json: bool) -> int:
     """Verify and print; the exit code."""
     began = time.perf_counter()
-    found = verify(recording.configuration, [received.message for received in recording.received])
+    found = verify(recording.configuration, [received.message for received in recording.received], cores())
     report = Report(recording, found, time.perf_counter() - began)
     if as_json:
         _print_json(report)
