@@ -15,6 +15,7 @@ from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.measurement_time import placed
 from lsu_mesh.mesh.messages import Fused, Measurement, Message, Prediction, Refused, Smoothed
 from lsu_mesh.mesh.verification.archive import Archive, DoesNotFit, Unverifiable
+from lsu_mesh.mesh.verification.banks import BankVerification
 from lsu_mesh.mesh.verification.claims import Claims
 from lsu_mesh.mesh.verification.containment import Containment
 from lsu_mesh.mesh.verification.findings import Difference, Missing
@@ -53,6 +54,8 @@ def verify(configuration: Configuration, messages: Iterable[Message]) -> Verific
 
     ``configuration`` is that of the recorded run.
     """
+    if configuration.instances is not None:
+        return _verified_banks(configuration, messages)
     archive = Archive(_placed(configuration, messages))
     recomputations: dict[str, Recomputation] = {}
     found = Verification(containment=Containment.of(configuration, archive))
@@ -68,6 +71,23 @@ def verify(configuration: Configuration, messages: Iterable[Message]) -> Verific
     claims.check_processes()
     found.false_claims, found.unproved = claims.false, claims.unproved
     return found
+
+
+def _verified_banks(configuration: Configuration, messages: Iterable[Message]) -> Verification:
+    """The sets of a mesh of banks; what holds the truth is counted target by target."""
+    banks = BankVerification(configuration, messages)
+    banks.check()
+    containment = Containment.of(configuration, Archive([]))
+    containment.holding, containment.misses = banks.holding, banks.misses
+    containment.excused = Counter(banks.excused)
+    containment.archive.truth = {step: [] for step in banks.steps_with_truth}
+    return Verification(
+        exact=Counter(banks.exact),
+        differences=banks.differences,
+        unverifiable=banks.unverifiable,
+        outdated=Counter(banks.outdated),
+        containment=containment,
+    )
 
 
 def _placed(configuration: Configuration, messages: Iterable[Message]) -> Iterator[Message]:
