@@ -159,7 +159,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("options",),
         ("network",),
         ("bus",),
-        ("session", "configuration", "mesh_start"),
+        ("session", "configuration", "mesh_start", "bank_limits"),
         ("recording", "monitoring"),
         ("viewers", "peer", "bank_answers", "recorder", "played_files", "published_lines", "new_mesh", "gateway"),
         ("ros2",),

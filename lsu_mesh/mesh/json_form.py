@@ -5,11 +5,13 @@ Those are times (their names end with ``_ns``) and ``seq``, in references too. A
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
+from lsu_mesh.mesh.bank_messages import STATUSES, BankMessage
 from lsu_mesh.mesh.messages import Fused, Message, Posterior
 
 Json = dict[str, Any]
@@ -30,9 +32,22 @@ def whole(message: Message, arrival_ns: int) -> Json:
     return {
         "topic": message.topic,
         "name": message.name,
-        **_safe(msgspec.to_builtins(message)),
+        **_safe(plain(message)),
         "arrival_ns": str(arrival_ns),
     }
+
+
+def plain(message: Message) -> Json:
+    """The fields as plain values; the arrays of a bank as rows of numbers, None for NaN, and its statuses as words."""
+    values: Json = msgspec.to_builtins(message, builtin_types=(bytes,))
+    if isinstance(message, BankMessage):
+        for name in [name for name, value in values.items() if isinstance(value, bytes)]:
+            values[name] = (
+                [STATUSES[code] for code in values[name]]
+                if name == "statuses"
+                else [[None if math.isnan(one) else one for one in row] for row in message.matrix(name).tolist()]
+            )
+    return values
 
 
 def estimate(message: Posterior, arrival_ns: int) -> Json:

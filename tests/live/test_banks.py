@@ -11,7 +11,7 @@ import msgpack
 import numpy as np
 import pytest
 from bank_mesh import TEXT, write
-from lsu_mesh_services.client import BankEstimate, Mesh, Stream, WrongValue, connect
+from lsu_mesh_services.client import STATUSES, BankEstimate, Mesh, Stream, WrongValue, connect
 from ports import free_port
 from waiting import WITHIN
 
@@ -102,3 +102,23 @@ def test_a_program_measures_all_targets(start: Start, tmp_path: Path) -> None:
         assert (estimate.lower[:, [0, 2]][seen] <= truth[seen]).all()
         assert (truth[seen] <= estimate.upper[:, [0, 2]][seen]).all()
         assert one.status(3) in ("predicted", "restarted")
+
+
+def test_a_bank_that_was_killed_takes_up_what_the_fusion_kept(start: Start, tmp_path: Path) -> None:
+    text = TEXT.replace("steps = 40", "steps = 100000") + '\n[fusion.main]\nsources = ["targets"]\n'
+    file = mesh_file(tmp_path, text)
+    session = start("run", str(file), "--no-record")
+    with connect(file, wait=2 * WITHIN) as mesh:
+        estimates, fused = mesh.bank("targets"), mesh.bank("main")
+        before = received(estimates, 5)[-1]
+        received(fused, 5)
+        one = mesh.latest("main", target=3)
+        assert one is not None
+        assert one.raw["policy"] == "intersect"
+        session.child("filter targets").kill()
+        end = time.monotonic() + 2 * WITHIN
+        while (again := received(estimates, 1)[0]).raw["boot"] == before.raw["boot"]:
+            assert time.monotonic() < end, "it did not start again"
+        assert set(again.statuses) == {STATUSES.index("restarted")}
+        assert again.raw["base"][:3] == ["bank_posterior", "filter/targets", before.raw["boot"]]
+        assert received(estimates, 3)[-1].status(3) == "ok"

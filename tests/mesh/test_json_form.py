@@ -9,7 +9,7 @@ import pytest
 from msgspec import structs
 
 from lsu_mesh.mesh.json_form import dumps, estimate, whole
-from lsu_mesh.mesh.message_examples import example
+from lsu_mesh.mesh.message_examples import bank_example, example
 from lsu_mesh.mesh.messages import TYPES, Posterior
 
 SAFE = 2**53
@@ -58,3 +58,11 @@ def test_an_estimate_has_bounds_and_point_without_them() -> None:
     assert (told["lower"], told["upper"], told["point"]) == ([-0.25, 0.5], [0.75, 1.0], [0.25, 0.75])
     assert told["rejected"] == [{"source": "cz", "reason": "disjoint"}]
     assert not {"support", "used", "base", "covariance"} & set(told)
+
+
+def test_arrays_of_a_bank_are_rows_and_statuses_words() -> None:
+    told = json.loads(dumps(whole(bank_example("bank_posterior"), 1)))
+    assert told["lower"] == [[-0.25, 0.5], [3.0, 4.0]]
+    assert told["statuses"] == ["ok", "predicted"]
+    assert (told["name"], told["center"], told["seq"]) == ("targets", None, "41")
+    assert whole(bank_example("bank_measurement"), 1)["y"] == [[0.7], [None]]

@@ -11,6 +11,7 @@ from lsu_mesh.mesh.config.settings import Configuration
 from lsu_mesh.mesh.measurement_time import placed
 from lsu_mesh.mesh.messages import Measurement, Message, Refused, Smoothed
 from lsu_mesh.mesh.verification.archive import Archive
+from lsu_mesh.mesh.verification.banks import BankVerification
 from lsu_mesh.mesh.verification.claims import Claims
 from lsu_mesh.mesh.verification.comparison import Outcome
 from lsu_mesh.mesh.verification.containment import Containment
@@ -46,6 +47,8 @@ def verify(configuration: Configuration, messages: Iterable[Message], processes:
     ``configuration`` is that of the recorded run. With ``processes`` > 1 the peers' sets are recomputed side by side,
     with the same result.
     """
+    if configuration.instances is not None:
+        return _verified_banks(configuration, messages)
     archive = Archive(_placed(configuration, messages))
     found = Verification(containment=Containment.of(configuration, archive))
     claims = Claims(configuration, archive)
@@ -70,6 +73,23 @@ def _count(found: Verification, recorded: Set | Smoothed, outcome: Outcome) -> N
         found.differences.append(Difference(*place, *outcome.different))
     else:
         found.exact[recorded.src, recorded.topic] += 1
+
+
+def _verified_banks(configuration: Configuration, messages: Iterable[Message]) -> Verification:
+    """The sets of a mesh of banks; what holds the truth is counted target by target."""
+    banks = BankVerification(configuration, messages)
+    banks.check()
+    containment = Containment.of(configuration, Archive([]))
+    containment.holding, containment.misses = banks.holding, banks.misses
+    containment.excused = Counter(banks.excused)
+    containment.archive.truth = {step: [] for step in banks.steps_with_truth}
+    return Verification(
+        exact=Counter(banks.exact),
+        differences=banks.differences,
+        unverifiable=banks.unverifiable,
+        outdated=Counter(banks.outdated),
+        containment=containment,
+    )
 
 
 def _placed(configuration: Configuration, messages: Iterable[Message]) -> Iterator[Message]:

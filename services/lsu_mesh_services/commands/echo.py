@@ -7,9 +7,8 @@ import json
 import sys
 from typing import Any
 
-import msgspec
-
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh.mesh.json_form import plain
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
 from lsu_mesh_services.monitoring.subscriber import Heard, run_tool, watching
 from lsu_mesh_services.network.addresses import read_address
@@ -54,7 +53,8 @@ def _echo(configuration: Configuration, options: argparse.Namespace) -> int:
 
 
 def _print(heard: Heard, options: argparse.Namespace) -> None:
-    content: dict[str, Any] = msgspec.to_builtins(heard.message)
+    assert heard.message is not None
+    content: dict[str, Any] = plain(heard.message)
     chosen = content if options.field is None else field_of(content, options.field)
     if options.json:
         about = {"topic": heard.topic, "name": heard.name, "arrival_ns": heard.arrival_ns}

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from lsu_mesh.mesh.config import Configuration
+from lsu_mesh_services.bank_limits import refuses_bank
 from lsu_mesh_services.bus import Bus, Clock
 from lsu_mesh_services.configuration import load_or_explain
 from lsu_mesh_services.exit_codes import COULD_NOT_START, FAILURE, OK, USAGE
@@ -34,7 +35,7 @@ PRIORITY = 5
 
 def main(options: argparse.Namespace) -> int:
     configuration = load_or_explain(options.config, options, makes_filters=False)
-    if configuration is None:
+    if configuration is None or refuses_bank(configuration, "gateway"):
         return USAGE
     try:
         address = read_address(options.http, allow_remote=options.allow_remote)

@@ -24,6 +24,7 @@ from lsu_mesh.mesh.messages import Input, Measurement, Message, Refused, decode
 from lsu_mesh.mesh.nodes.played_rows import PlayedRows
 from lsu_mesh.mesh.nodes.recorded_inputs import recorded_inputs
 from lsu_mesh.rate_identification import explain_rates
+from lsu_mesh_services.bank_limits import refuses_bank
 from lsu_mesh_services.configuration import load_or_explain, print_warnings
 from lsu_mesh_services.exit_codes import FAILURE, NOT_MET, OK, USAGE
 from lsu_mesh_services.played_files import accounts_or_explain
@@ -37,7 +38,7 @@ class NoData(LsuMeshError):
 
 def main(options: argparse.Namespace) -> int:
     configuration = load_or_explain(options.file, options)
-    if configuration is None:
+    if configuration is None or refuses_bank(configuration, "identify"):
         return USAGE
     print_warnings(configuration)
     unknown_sensors = [name for name in options.sensors or () if name not in configuration.sensors]

@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from lsu_mesh_services.bank_limits import refuses_bank
 from lsu_mesh_services.exit_codes import NOT_MET, USAGE
 from lsu_mesh_services.recording.read import Recording, read_recording
 
@@ -25,6 +26,8 @@ def main(options: argparse.Namespace) -> int:
     if not recording.received:
         print(f"{options.file}: holds no messages", file=sys.stderr)
         return NOT_MET
+    if refuses_bank(recording.configuration, "replay"):
+        return USAGE
     if options.live:
         from lsu_mesh_services.replay.live import replay_live
 

@@ -17,6 +17,7 @@ from lsu_mesh.mesh.config import ConfigurationError, load
 from lsu_mesh.mesh.simulator.campaign import CHUNK, Tally, run_seeds
 from lsu_mesh.mesh.simulator.faults import parse_faults
 from lsu_mesh.mesh.simulator.run import Outcome
+from lsu_mesh_services.bank_limits import refuses_bank
 from lsu_mesh_services.configuration import DEMO, print_problems
 from lsu_mesh_services.exit_codes import NOT_MET, OK, USAGE
 from lsu_mesh_services.stop import Stop
@@ -33,6 +34,8 @@ def main(options: argparse.Namespace) -> int:
         configuration = load(path)
     except ConfigurationError as error:
         print_problems(error)
+        return USAGE
+    if refuses_bank(configuration, "simulate"):
         return USAGE
     sensors = configuration.sensors.values()
     has_plant = configuration.plant is not None or any(sensor.is_live for sensor in sensors)

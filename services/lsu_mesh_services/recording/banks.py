@@ -16,7 +16,7 @@ from lsu_mesh.mesh.bank_messages import INCONSISTENT, RESTARTED, BankSets, BankT
 from lsu_mesh_services.recording.bands import band_columns, band_style, line_style
 from lsu_mesh_services.recording.entity_paths import EntityPaths, path
 from lsu_mesh_services.recording.palette import TRUTH, Color
-from lsu_mesh_services.recording.timeline import Moment, Timelines
+from lsu_mesh_services.recording.timeline import Moment, Stream, Timelines
 
 SHOWN = 3
 """Targets whose bands are drawn: the first ones."""
@@ -36,9 +36,7 @@ class _Row(NamedTuple):
 class BankDrawings:
     """Collects rows of banks and sends them in batches."""
 
-    def __init__(
-        self, stream: rr.RecordingStream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]
-    ) -> None:
+    def __init__(self, stream: Stream, timelines: Timelines, names: EntityPaths, colors: dict[str, Color]) -> None:
         self._stream, self._timelines, self._names = stream, timelines, names
         self._rows: defaultdict[str, list[_Row]] = defaultdict(list)
         self._truths: list[tuple[Moment, Matrix]] = []
