@@ -10,10 +10,11 @@ from typing import ClassVar, Literal, NamedTuple, cast, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lsu_mesh.array_types import Matrix, Vector
+from lsu_mesh.array_types import Array, Matrix, Stack, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
-from lsu_mesh.filters.density import Density, Drive, PointEstimate, noise_covariance
-from lsu_mesh.filters.filter import Filter, GainOf, OutputPrediction
+from lsu_mesh.filters.compiled_loop import CompiledLoop, LoopData, LoopResult
+from lsu_mesh.filters.density import Density, Drive, PointEstimate
+from lsu_mesh.filters.filter import GainOf, OutputPrediction
 from lsu_mesh.filters.inconsistency import known_to_last_bits, strip_contradiction
 from lsu_mesh.filters.plain_outputs import plain_strips, shifted
 from lsu_mesh.filters.point_rule import PointOption, PointRule
@@ -25,9 +26,9 @@ from lsu_mesh.filters.validation import (
     kernel_model,
     same_states,
     step_arrays,
-    with_offset,
 )
-from lsu_mesh.kernels import batch_run, filter_point, filter_step
+from lsu_mesh.kernels import batch_run, filter_point, filter_step, run_tables
+from lsu_mesh.kernels.points.room import room
 from lsu_mesh.kernels.runtime.scratch import Scratch, scratch
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.orthotope import Orthotope
@@ -52,7 +53,7 @@ class Snapshot(NamedTuple):
     met: Support | None
 
 
-class CompiledFilter(Filter):
+class CompiledFilter(CompiledLoop):
     """A filter whose steps are those of ``kernels/filter_step.py`` for its ``family`` and ``option``.
 
     The state is a matrix with rows of length n. It is never written again once it is in force, so that a snapshot holds
@@ -251,50 +252,25 @@ class CompiledFilter(Filter):
         self._met = None if met is None else (self._state, met)
 
     @property
-    def has_compiled_loop(self) -> bool:
-        """Whether :meth:`sweep` does what the steps one by one do: not where a step must look at its set."""
-        return self._model.has_plain_outputs and self._model.radii is None
+    def loop_state(self) -> Array:
+        return self._state.copy()
 
-    def sweep(self, Y: Matrix, U: Matrix, record: batch_run.Record, points: bool = True) -> tuple[int, int]:
-        """Update and predict for all rows of Y (T, m), U (T, p) in a compiled loop; ``record`` has a leading axis 1.
+    def hold_loop_state(self, state: Array, density: Density | None) -> None:
+        self._state, self._density = state, density
 
-        Returns the rows that are done, and where it stopped (``kernels/batch_run.py``); the filter holds the last good
-        state. Without ``points`` those of the record are left as they are.
-        """
-        a = self._arrays
-        domain = self._model.domain
-        models = batch_run.Models(
-            A=a.A[np.newaxis],
-            B=a.B[np.newaxis],
-            C=a.C[np.newaxis],
-            G=a.G[np.newaxis],
-            widths=a.widths[np.newaxis],
-            r=a.r[np.newaxis],
-            domains=np.zeros((1, 0, len(a.A))) if domain is None else np.array([domain.bounds()]),
-            Q=noise_covariance(self._model, None)[np.newaxis],
-        )
-        states, outcome = self._state[np.newaxis].copy(), np.zeros((1, 2), dtype=np.int64)
-        estimates = self._estimates([self._density])
-        batch_run.sweep(
-            self.family, self.option, True, False, states, np.empty_like(self._state), models,
-            Y[np.newaxis], with_offset(self._model, U)[np.newaxis], record, outcome, 0, 1, self._work,
-            estimates, points, self._estimate.room,
-        )  # fmt: skip
-        self._state = states[0]
-        if self._density is not None:
-            self._density = Density(estimates.means[0], estimates.covariances[0])
-        return int(outcome[0, 0]), int(outcome[0, 1])
-
-    def _estimates(self, densities: Sequence[Density | None]) -> batch_run.Estimates:
-        """The rule and copies of the densities, as the compiled loop writes them."""
+    def run_states(
+        self, states: Array, models: run_tables.Models, estimates: run_tables.Estimates, data: LoopData,
+        result: LoopResult, first: int, last: int, kept: Stack,
+    ) -> None:  # fmt: skip
         n = self._model.state_count
-        blank = Density(np.zeros(n), np.zeros((n, n)))
-        held = [blank if density is None else density for density in densities]
-        return batch_run.Estimates(
-            rule=self._estimate.code,
-            means=np.array([density.mean for density in held]),
-            covariances=np.array([density.covariance for density in held]),
-        )
+        batch_run.sweep(
+            self.family, self.option, data.updates, data.last_prediction, states, np.empty_like(self._state), models,
+            data.Y, data.U, result.record, result.outcome, first, last, self._scratch(models.G.shape[2]), estimates,
+            data.points, room(n),
+        )  # fmt: skip
+
+    def estimates(self, densities: Sequence[Density | None]) -> run_tables.Estimates:
+        return self._estimate.tables(densities)
 
     def _of_step(self, model: LSUModel) -> tuple[LSUModel, KernelModel]:
         return same_states(self._model, model), step_arrays(model)
@@ -329,14 +305,14 @@ class CompiledFilter(Filter):
     def _located(self, state: Matrix, density: Density | None) -> Vector:
         """The point of a state by the rule."""
         point, lower, upper, _ = self._describe(state)
-        rule, (mean, P) = self._estimate.code, self._estimates([density])[1:]
+        rule, (mean, P) = self._estimate.code, self.estimates([density])[1:]
         filter_point.locate(self.family, rule, state, mean[0], P[0], lower, upper, point, self._estimate.room)
         return point
 
     def _output_point(self, C: Matrix) -> Vector:
         """``C x`` of the point x, as the compiled loop computes it."""
         point, y = np.empty(self._model.state_count), np.empty(len(C))
-        rule, (mean, P) = self._estimate.code, self._estimates([self._density])[1:]
+        rule, (mean, P) = self._estimate.code, self.estimates([self._density])[1:]
         filter_point.locate_output(
             self.family, rule, self._state, mean[0], P[0], C, point, y, self._work, self._estimate.room
         )

@@ -9,14 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lsu_mesh.array_types import Vector
-from lsu_mesh.errors import InconsistentData
+from lsu_mesh.errors import InconsistentData, ModelError
 from lsu_mesh.filters.density import Density
-from lsu_mesh.filters.lagged_states import body_of, with_newest
+from lsu_mesh.filters.lagged_states import StackedStep, body_of, with_newest
+from lsu_mesh.filters.validation import KernelModel
+from lsu_mesh.kernels.parallelotopes.box import keep_constants
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
+from lsu_mesh.kernels.zonotopes.time_update import predict_constrained
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.reduction import Body
+from lsu_mesh.supports.reduction import Body, Limits
 from lsu_mesh.supports.support import Support
+
+GENERATORS, GENERATORS_PER_STATE = 20, 3
+"""Generators of a set at least, and for each state, where the user states no limit."""
 
 
 class Held(NamedTuple):
@@ -34,6 +40,34 @@ class Held(NamedTuple):
     """Beside the set, for the point estimate; ``None`` in a set on the way: it then keeps the one in force."""
     met: Support | None = None
     """The set that was met last, where nothing has come since."""
+
+
+def checked_limits(
+    n: int, lag: int, max_generators: int | None, max_constraints: int | None, *, reduces: bool
+) -> Limits:  # fmt: skip
+    """The limits that the options of a filter with n states stand for; ``ModelError`` where one of them is wrong."""
+    if lag < 0:
+        raise ModelError(f"lag must not be negative, it is {lag}")
+    least = n * (lag + 1)
+    if max_generators is not None and max_generators < least:
+        number = "the number of states" if not lag else f"the states of {lag + 1} steps"
+        raise ModelError(f"max_generators must be at least {least}, {number}, it is {max_generators}")
+    if max_constraints is not None and max_constraints < 0:
+        raise ModelError(f"max_constraints must not be negative, it is {max_constraints}")
+    if max_generators is None:
+        max_generators = max(GENERATORS, GENERATORS_PER_STATE * n) + n * lag
+    return Limits(max_generators, max_constraints) if reduces else Limits(None, None)
+
+
+def advanced(
+    body: Body, lower: Vector, upper: Vector, arrays: KernelModel, step: StackedStep, *, u: Vector, widths: Vector
+) -> Held | None:
+    """The time update of a set and its box, or of stacks of them; ``None`` where numbers outgrow double precision."""
+    box = np.array([lower, upper])  # one compiled kernel serves, whether or not the bounds may be written
+    finite, body, low, high = predict_constrained(body, box[0], box[1], step.R, step.B, u, step.G, widths)
+    n = len(arrays.A)
+    keep_constants(box[0, :n], box[1, :n], arrays.A, arrays.B, u, arrays.G, widths, low[:n], high[:n])
+    return Held(body, low, high, is_hull=False) if finite else None
 
 
 def within(held: Held, domain: Orthotope) -> Held:

@@ -6,7 +6,7 @@ It is for output only: no set, bound or decision depends on it. Boxes and sets o
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from lsu_mesh.kernels.filter_point import CENTRE, MEAN, NEAREST
 from lsu_mesh.kernels.points import density as kernels
 from lsu_mesh.kernels.points.room import Room, room
 from lsu_mesh.kernels.points.stretch_noise import stretch_covariance
+from lsu_mesh.kernels.run_tables import Estimates
 from lsu_mesh.model import LSUModel
 
 RULES = {"mean": MEAN, "nearest": NEAREST, "centre": CENTRE}
@@ -52,12 +53,24 @@ class PointEstimate:
     def __init__(self, model: LSUModel, rule: str) -> None:
         self.rule = point_rule(rule)
         self.room: Room = room(model.state_count)
+        self._state_count = model.state_count
         self._dt_ns = model.length_ns
 
     @property
     def code(self) -> int:
         """The rule as kernels take it."""
         return RULES[self.rule]
+
+    def tables(self, densities: Sequence[Density | None]) -> Estimates:
+        """The rule and copies of the densities (N of them), as compiled loops write them."""
+        n = self._state_count
+        blank = Density(np.zeros(n), np.zeros((n, n)))
+        held = [blank if density is None else density for density in densities]
+        return Estimates(
+            rule=self.code,
+            means=np.array([density.mean for density in held]),
+            covariances=np.array([density.covariance for density in held]),
+        )
 
     def started(self, lower: Vector, upper: Vector) -> Density | None:
         """The uniform distribution on the box [lower, upper] (n,)."""

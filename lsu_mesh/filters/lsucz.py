@@ -10,38 +10,35 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
+from lsu_mesh.filters.compiled_sets import CompiledSets, PackedSet, unpacked
 from lsu_mesh.filters.constrained_intersection import joined
-from lsu_mesh.filters.constrained_state import Held, log_size, within
+from lsu_mesh.filters.constrained_state import Held, advanced, checked_limits, log_size, within
 from lsu_mesh.filters.density import Density, Drive, PointEstimate
-from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
+from lsu_mesh.filters.filter import GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
 from lsu_mesh.filters.lagged_states import body_of, rows_of, stacked_step, with_newest
-from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.plain_outputs import plain_strips, shifted, widened
 from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import conditioned, hull_gain
-from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
-from lsu_mesh.kernels.parallelotopes.box import keep_constants
+from lsu_mesh.filters.validation import KernelModel, checked_prior, driven, kernel_model, same_states, step_arrays
+from lsu_mesh.kernels.set_run import CONSTRAINED, PREDICT, UPDATE, Kind
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
-from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
+from lsu_mesh.kernels.zonotopes.time_update import image_of_box
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.arrays import box_volume
 from lsu_mesh.supports.constrained_zonotope import ConstrainedZonotope
 from lsu_mesh.supports.nearest_point import nearest_point, nearest_to_center
 from lsu_mesh.supports.orthotope import Orthotope
-from lsu_mesh.supports.reduction import Body, Limits, settle
+from lsu_mesh.supports.reduction import Body, settle
 from lsu_mesh.supports.support import Support
 
 LITTLE_GAIN = 0.03
 """Nats below which a transferred set is weighed against what the reduction of the intersection costs."""
-
-
-GENERATORS, GENERATORS_PER_STATE = 20, 3
-"""Generators of a set at least, and for each state, where the user states no limit."""
 MAX_EXACT_VOLUME = 3
 """Dimension up to which :meth:`LSUCZ.volume` enumerates vertices; ``support.volume()`` does so up to 6."""
 
 
-class LSUCZ(Filter):
+class LSUCZ(CompiledSets):
     """``X_{k|k} = X_{k|k−1} ∩ {|y − C x| ≤ r}``,  ``X_{k+1|k} = A X_{k|k} ⊕ B u ⊕ N box(rho)`` (P2023 (15), (16)).
 
     Parameters
@@ -86,31 +83,18 @@ class LSUCZ(Filter):
     _bounds: tuple[Vector, Vector] | None
 
     def __init__(
-        self,
-        model: LSUModel,
-        prior: Support | tuple[ArrayLike, ArrayLike],
-        max_generators: int | None = None,
-        max_constraints: int | None = 8,
-        point: PointOption = "mean",
-        reduce: bool = True,
-        lag: int = 0,
-    ) -> None:
+        self, model: LSUModel, prior: Support | tuple[ArrayLike, ArrayLike], max_generators: int | None = None,
+        max_constraints: int | None = 8, point: PointOption = "mean", reduce: bool = True, lag: int = 0,
+    ) -> None:  # fmt: skip
         n = model.state_count
-        if lag < 0:
-            raise ModelError(f"lag must not be negative, it is {lag}")
-        least = n * (lag + 1)
-        if max_generators is not None and max_generators < least:
-            number = "the number of states" if not lag else f"the states of {lag + 1} steps"
-            raise ModelError(f"max_generators must be at least {least}, {number}, it is {max_generators}")
-        if max_constraints is not None and max_constraints < 0:
-            raise ModelError(f"max_constraints must not be negative, it is {max_constraints}")
+        self._limits = checked_limits(n, lag, max_generators, max_constraints, reduces=reduce)
         self._model = model
         self._arrays = kernel_model(model)
-        if max_generators is None:
-            max_generators = max(GENERATORS, GENERATORS_PER_STATE * n) + n * lag
-        self._limits = Limits(max_generators, max_constraints) if reduce else Limits(None, None)
         self._estimate = PointEstimate(model, point)
         self._lag = lag
+        most, rows = (-1 if limit is None else limit for limit in self._limits)
+        self._kind = Kind(CONSTRAINED, most, rows, scaled=False, has_box=True)
+        self._started_tables(n, model.output_count)
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
     @property
@@ -140,14 +124,14 @@ class LSUCZ(Filter):
 
         Raises ``ModelError`` where no state of so many steps back is held: beyond the lag, or before the start.
         """
-        place = self._place(steps)
-        return ConstrainedZonotope.of_arrays(*body_of(self._held.body, place, self._model.state_count))
+        self._check_held(steps)
+        return ConstrainedZonotope.of_arrays(*body_of(self._held.body, steps, self._model.state_count))
 
     def smoothed_bounds(self, steps: int) -> tuple[Vector, Vector]:
         """Bounds (n,), (n,) of x_{k−steps} given all data so far: of :meth:`smoothed`, met with the box beside it."""
-        n, place = self._model.state_count, self._place(steps)
-        lower, upper = self._stack_bounds()
-        return lower[place * n : (place + 1) * n], upper[place * n : (place + 1) * n]
+        self._check_held(steps)
+        n, (lower, upper) = self._model.state_count, self._stack_bounds()
+        return lower[steps * n : (steps + 1) * n], upper[steps * n : (steps + 1) * n]
 
     @property
     def point(self) -> Vector:
@@ -186,79 +170,48 @@ class LSUCZ(Filter):
         """``C X ⊕ [−r, r]`` by safe linear programs, met with interval arithmetic over :meth:`bounds`."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        low, high = self._image(arrays.C)
-        r = arrays.r
-        lower = np.where(r > 0, np.nextafter(low - r, -np.inf), low)
-        upper = np.where(r > 0, np.nextafter(high + r, np.inf), high)
-        return shifted(OutputPrediction(lower, upper, used.C @ self.point), used, u)
+        found = None if self._lag else self._output(arrays)
+        if found is None:
+            low, high = self._image(arrays.C)
+            lower, upper = widened(low, high, arrays.r)
+        else:
+            lower, upper, self._bounds = found
+        return shifted(OutputPrediction(lower, upper, self._output_point(used.C)), used, u)
 
     def update(
-        self,
-        y: ArrayLike,
-        r: ArrayLike | None = None,
-        model: LSUModel | None = None,
+        self, y: ArrayLike, r: ArrayLike | None = None, model: LSUModel | None = None,
         u: ArrayLike | Orthotope | None = None,
-    ) -> ConstrainedZonotope:
+    ) -> ConstrainedZonotope:  # fmt: skip
         """Data update: one generator and one constraint per strip, then reduction (P2023 (15))."""
-        used = same_states(self._model, model)
-        arrays = self._arrays if model is None else step_arrays(used)
-        C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r=r, u=u, image=self._image)
-        if not np.isnan(values).all():
-            try:
-                held = self._cut(rows_of(C, 0, self._depth), values, widths)
-            except InconsistentData as contradiction:
-                raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
-            density = self._held.density
-            self._hold(held)
+        density = self._held.density
+        cut = self._take(y, 0, r, model=model, u=u)
+        if cut is not None:
+            arrays, values, widths = cut
             self._hold_density(self._estimate.updated(density, arrays, values, widths=widths, bounds=self.bounds))
         return self.support
 
     def update_late(
-        self,
-        y: ArrayLike,
-        steps: int,
-        r: ArrayLike | None = None,
-        model: LSUModel | None = None,
+        self, y: ArrayLike, steps: int, r: ArrayLike | None = None, model: LSUModel | None = None,
         u: ArrayLike | Orthotope | None = None,
-    ) -> ConstrainedZonotope:
+    ) -> ConstrainedZonotope:  # fmt: skip
         """Data update with y (m,) of ``steps`` steps ago, within the lag; r, model and u are those of that step.
 
         Without reduction the sets are those that the data give in order. The density beside the set, from which the
         point comes, takes nothing from late data. Raises as :meth:`update` and :meth:`smoothed`.
         """
-        used, place = same_states(self._model, model), self._place(steps)
-        arrays = self._arrays if model is None else step_arrays(used)
-        image = partial(self._image, place=place)
-        values, widths = plain_strips(used, arrays, y, r=r, u=u, image=image)
-        if not np.isnan(values).all():
-            try:
-                self._hold(self._cut(rows_of(arrays.C, place, self._depth), values, widths))
-            except InconsistentData as contradiction:
-                raise strip_contradiction(used.outputs, *image(arrays.C), values, widths) from contradiction
+        self._check_held(steps)
+        self._take(y, steps, r, model=model, u=u)
         return self.support
 
     def predict(
-        self,
-        u: ArrayLike | Orthotope | None = None,
-        rho: ArrayLike | None = None,
-        model: LSUModel | None = None,
+        self, u: ArrayLike | Orthotope | None = None, rho: ArrayLike | None = None, model: LSUModel | None = None
     ) -> ConstrainedZonotope:
         """Time update ``A X ⊕ B u ⊕ N box(rho)`` (P2023 (16)), met with ``model.domain`` where it exceeds it."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
         center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
-        body, (lower, upper) = self._held.body, self._stack_bounds()
-        if not self._limits.allow(body):
-            body, lower, upper = self._settled(body, lower, upper)[:3]
-        step = stacked_step(arrays, self._depth, self._lag)
-        box = np.array([lower, upper])  # one compiled kernel serves, whether or not the bounds may be written
-        finite, body, lower, upper = predict_constrained(body, box[0], box[1], step.R, step.B, center, step.G, widths)
-        n = len(arrays.A)
-        keep_constants(box[0, :n], box[1, :n], arrays.A, arrays.B, center, arrays.G, widths, lower[:n], upper[:n])
-        if not finite:
-            raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
-        density, held = self._held.density, Held(body, lower, upper, is_hull=False)
-        self._hold(held if used.domain is None else within(held, used.domain))
+        density = self._held.density
+        self._hold(self._moved(used, arrays, center, widths))
         if density is not None:
             drive = Drive(center, widths, has_rho=rho is not None)
             self._hold_density(self._estimate.predicted(density, used, arrays, drive, bounds=self.bounds))
@@ -339,10 +292,6 @@ class LSUCZ(Filter):
         """So many states are held, the newest first."""
         return self._held.lower.size // self._model.state_count
 
-    def _place(self, steps: int) -> int:
-        self._check_held(steps)
-        return steps
-
     def _stack_bounds(self) -> tuple[Vector, Vector]:
         if self._held.is_hull:
             return self._held.lower, self._held.upper
@@ -354,11 +303,64 @@ class LSUCZ(Filter):
             )
         return self._bounds
 
+    def _take(
+        self, y: ArrayLike, place: int, r: ArrayLike | None, *, model: LSUModel | None, u: ArrayLike | Orthotope | None
+    ) -> tuple[KernelModel, Vector, Vector] | None:
+        """Hold the part that data of ``place`` steps ago leave; the model and the strips, ``None`` without data."""
+        used = same_states(self._model, model)
+        arrays, image = self._arrays if model is None else step_arrays(used), partial(self._image, place=place)
+        values, widths = plain_strips(used, arrays, y, r=r, u=u, image=image)
+        if np.isnan(values).all():
+            return None
+        try:
+            self._hold(self._cut(rows_of(arrays.C, place, self._depth), values, widths))
+        except InconsistentData as contradiction:
+            raise strip_contradiction(used.outputs, *image(arrays.C), values, widths) from contradiction
+        return arrays, values, widths
+
     def _cut(self, P: Matrix, values: Vector, widths: Vector) -> Held:
         """The part in the strips ``|values − P x| ≤ widths``, P (m, n depth), NaN for no strip."""
+        if not self._lag:
+            a = self._arrays
+            cut = self._stepped(UPDATE, a, P=P, y=values, r=widths, u=np.zeros(a.B.shape[1]), widths=a.widths)
+            if cut is not None:
+                return Held(*cut)
         c, G, A, b = self._held.body
-        cut = (c, *meet_strips(c, G, A, b, P, values, widths))
-        return self._settled(cut, self._held.lower, self._held.upper)
+        met = (c, *meet_strips(c, G, A, b, P, values, widths))
+        return self._settled(met, self._held.lower, self._held.upper)
+
+    def _moved(self, model: LSUModel, arrays: KernelModel, u: Vector, widths: Vector) -> Held:
+        """The time update ``A X ⊕ B u ⊕ G box(widths)``, met with the domain."""
+        if not self._lag:
+            y = np.full(arrays.r.size, np.nan)
+            moved = self._stepped(
+                PREDICT, arrays, P=arrays.C, y=y, r=arrays.r, u=u, widths=widths, domain=model.domain
+            )  # fmt: skip
+            if moved is not None:
+                return Held(*moved)
+        body, (lower, upper) = self._held.body, self._stack_bounds()
+        if not self._limits.allow(body):
+            body, lower, upper = self._settled(body, lower, upper)[:3]
+        held = advanced(body, lower, upper, arrays, stacked_step(arrays, self._depth, self._lag), u=u, widths=widths)
+        if held is None:
+            raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
+        return held if model.domain is None else within(held, model.domain)
+
+    @property
+    def _packed(self) -> PackedSet:
+        return PackedSet(*self._held[:4])
+
+    def _hold_packed(self, held: PackedSet, density: Density | None) -> None:
+        self._hold(Held(*held, density=density))
+
+    def snapshot_of(self, state: Vector) -> Held:
+        """The set of a row of a run."""
+        return Held(*unpacked(state, self._model.state_count))
+
+    @property
+    def has_compiled_loop(self) -> bool:
+        """Without a lag, and with a limit of generators."""
+        return super().has_compiled_loop and not self._lag and self._limits.generators is not None
 
     def _hold(self, held: Held) -> None:
         """Hold a set, beside which the density in force stays where it brings none."""

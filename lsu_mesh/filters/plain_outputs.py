@@ -63,6 +63,12 @@ def shifted(prediction: OutputPrediction, model: LSUModel, u: ArrayLike | Orthot
     return prediction
 
 
+def widened(low: Vector, high: Vector, r: Vector) -> tuple[Vector, Vector]:
+    """``[low − r, high + r]`` (m,), rounded outward where r > 0."""
+    lower = np.where(r > 0, np.nextafter(low - r, -np.inf), low)
+    return lower, np.where(r > 0, np.nextafter(high + r, np.inf), high)
+
+
 def _shift(model: LSUModel, u: ArrayLike | Orthotope | None, is_asked: Flags) -> tuple[Vector, Vector]:
     """``D u + d`` (m,) and what is not known of it; u may be left out where no output that is asked for sees it."""
     m = model.output_count

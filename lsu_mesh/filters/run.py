@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix
 from lsu_mesh.errors import LsuMeshError, ModelError
-from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.compiled_loop import CompiledLoop
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.grid import OffGrid
 from lsu_mesh.filters.inconsistent_rows import OnInconsistency, RowRule
 from lsu_mesh.filters.run_record import FilterRun, blank_run, store_output, store_set
 from lsu_mesh.filters.timed_run import Models, Rows, run_rows
 from lsu_mesh.filters.validation import numbers
-from lsu_mesh.kernels import batch_run
+from lsu_mesh.kernels import run_tables
 from lsu_mesh.model import ContinuousModel, LSUModel
 
 
@@ -45,7 +45,8 @@ def run_filter(
     Y, U:
         (T, m), NaN or a masked entry for a missing output; (T, p), ``None`` for a model without inputs.
         The last row of U is not used (T − 1 rows are enough) unless D ≠ 0. LSUO, LSUP and LSUPB run plain models in one
-        compiled loop, with the same bits as step by step.
+        compiled loop, with the same bits as step by step; LSUCZ and ZonotopicKalman do so where no points are asked
+        for, or those of the rule ``"centre"``.
     times:
         Times (T,) of the rows in whole nanoseconds, or ``datetime64``, not decreasing. The filter's model (or every
         model of ``models``) is one of a continuous model, and the set is carried over the true lengths: row k of the
@@ -103,7 +104,12 @@ def run_filter(
             run_rows(filter, rows, rule=rule, run=run)
         elif np.any(time_errors) or dt_ns is not None or rate is not None:
             raise ModelError("time_errors, dt_ns and rate need times")
-        elif isinstance(filter, CompiledFilter) and filter.has_compiled_loop:
+        elif (
+            isinstance(filter, CompiledLoop)
+            and filter.has_compiled_loop
+            and (filter.has_compiled_points or filter.point_rule == "centre" or not points)
+        ):
+            run.filter = None if volumes is False or filter.has_compiled_volumes else filter
             _sweep(filter, outputs, inputs, rule=rule, run=run)
         else:
             run.filter = None if volumes is False else filter
@@ -128,21 +134,25 @@ def _step(filter: Filter, Y: Matrix, U: Matrix, rule: RowRule, run: FilterRun) -
             rule.advance(k, partial(filter.predict, U[k] if U.shape[1] else None))
 
 
-def _sweep(filter: CompiledFilter, Y: Matrix, U: Matrix, rule: RowRule, run: FilterRun) -> None:
+def _sweep(filter: CompiledLoop, Y: Matrix, U: Matrix, rule: RowRule, run: FilterRun) -> None:
     """All rows in the compiled loop, which stops at a contradiction and goes on after what the rule makes of it."""
-    tables, row = list(run), 0
+    tables, row = [tuple.__getitem__(run, i) for i in range(len(run))], 0
     run.status[:] = ["missing" if np.isnan(y).all() else "ok" for y in Y]
     while row < len(Y):
-        record = batch_run.Record(*(table[np.newaxis, row:] for table in tables))
-        done, where = filter.sweep(Y[row:], U[row:], record, run.has_points)
+        record = run_tables.Record(*(table[np.newaxis, row:] for table in tables))
+        sets = None if run.filter is None else run.sets
+        done, where = filter.sweep(Y[row:], U[row:], record, run.has_points, sets)
         row += done
         run.done = row
-        if where == batch_run.IN_UPDATE:
+        if where == run_tables.IN_OUTPUT:
+            store_output(run, row, filter.predict_output())
+        if where in (run_tables.IN_UPDATE, run_tables.IN_OUTPUT):
             rule.update(row, Y[row], u=U[row])
             store_set(run, row, filter)
-            run.volumes[row] = filter.volume()
+            if filter.has_compiled_volumes:
+                run.volumes[row] = filter.volume()
             row += 1
-        if where != batch_run.DONE and row < len(Y):
+        if where != run_tables.DONE and row < len(Y):
             rule.advance(row - 1, partial(filter.predict, U[row - 1] if U.shape[1] else None))
             if rule.has_started_again():
                 run.status[row] = "reset"

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from lsu_mesh.array_types import Matrix, Vector
 from lsu_mesh.errors import InconsistentData, ModelError, UnboundedSupport
+from lsu_mesh.filters.compiled_sets import CompiledSets, PackedSet, unpacked
 from lsu_mesh.filters.density import Density, Drive, PointEstimate
-from lsu_mesh.filters.filter import Filter, GainOf, Guarantee, OutputPrediction
+from lsu_mesh.filters.filter import GainOf, Guarantee, OutputPrediction
 from lsu_mesh.filters.inconsistency import strip_contradiction
-from lsu_mesh.filters.plain_outputs import plain_strips, shifted
+from lsu_mesh.filters.plain_outputs import plain_strips, shifted, widened
 from lsu_mesh.filters.point_rule import PointOption, PointRule
 from lsu_mesh.filters.transfer_gain import MAX_SWEEPS, SETTLED, conditioned, hull_gain
-from lsu_mesh.filters.validation import checked_prior, driven, kernel_model, same_states, step_arrays
+from lsu_mesh.filters.validation import KernelModel, checked_prior, driven, kernel_model, same_states, step_arrays
+from lsu_mesh.filters.zonotopic_state import (
+    Held,
+    Strips,
+    bounds_of,
+    corrected_by,
+    everything,
+    held_of,
+    is_contradictory,
+    no_strips,
+    size_of,
+    stacked,
+    zonotope_hull,
+)
 from lsu_mesh.kernels.parallelotopes.box import keep_constants
 from lsu_mesh.kernels.parallelotopes.bundle import tighten_all
+from lsu_mesh.kernels.set_run import PREDICT, UPDATE, ZONOTOPE, Kind
 from lsu_mesh.kernels.zonotopes.constrained_zonotope import meet_strips
 from lsu_mesh.kernels.zonotopes.time_update import image_of_box, predict_constrained
-from lsu_mesh.kernels.zonotopes.zonotope import absorb_box
-from lsu_mesh.kernels.zonotopes.zonotopic_kalman import box_shortest, corrected, kalman_gain
+from lsu_mesh.kernels.zonotopes.zonotopic_kalman import box_shortest
 from lsu_mesh.model import LSUModel
 from lsu_mesh.supports.linear_programs import is_proved_empty
 from lsu_mesh.supports.nearest_point import nearest_point
@@ -33,29 +47,7 @@ COLUMNS, COLUMNS_PER_STATE = 15, 3
 """Columns of a zonotope at least, and for each state, where the user states no order."""
 
 
-class Strips(NamedTuple):
-    """``|y − C x| ≤ r``: C (k, n), y (k,), r (k,)."""
-
-    C: Matrix
-    y: Vector
-    r: Vector
-
-
-class Held(NamedTuple):
-    """What the filter knows: the state lies in ``c + H ξ`` and in [lower, upper]; ``pending`` data are not used yet."""
-
-    c: Vector
-    H: Matrix
-    lower: Vector
-    upper: Vector
-    pending: Strips
-    density: Density | None = None
-    """Beside the set, for the point estimate."""
-    met: Support | None = None
-    """The set that was met last, where nothing has been brought to the zonotope since."""
-
-
-class ZonotopicKalman(Filter):
+class ZonotopicKalman(CompiledSets):
     """``c ← c + K (y − C c)``, ``H ← [(I − K C) H, K diag(r)]``; then ``A c + B u``, ``[A H, N diag(rho)]``.
 
     Parameters
@@ -122,6 +114,9 @@ class ZonotopicKalman(Filter):
         self._has_box = bool(box)
         self._scaled = bool(scaled)
         self._estimate = PointEstimate(model, point)
+        most = -1 if self._order is None else self._order
+        self._kind = Kind(ZONOTOPE, most, 0, scaled=self._scaled, has_box=self._has_box)
+        self._started_tables(model.state_count, model.output_count)
         self.reset(prior if isinstance(prior, Support) else Orthotope(*prior))
 
     @property
@@ -132,7 +127,7 @@ class ZonotopicKalman(Filter):
     @property
     def support(self) -> Zonotope:
         """The zonotope that holds the state."""
-        return Zonotope(self._held.c, self._held.H)
+        return Zonotope.of_arrays(self._held.c, self._held.H)
 
     @property
     def point(self) -> Vector:
@@ -153,20 +148,17 @@ class ZonotopicKalman(Filter):
 
     def bounds(self) -> tuple[Vector, Vector]:
         """Interval hull of the zonotope, met with the box beside it; (n,), (n,)."""
-        return _bounds(self._held)
+        held = self._held
+        lower, upper = self.support.bounds()
+        return np.maximum(lower, held.lower), np.minimum(upper, held.upper)
 
     def predict_output(self, u: ArrayLike | Orthotope | None = None, model: LSUModel | None = None) -> OutputPrediction:
         """``C c ± (Σ_j |C H_j| + r)``, met with the image of :meth:`bounds`."""
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
-        low, high = self._image(arrays.C)
-        r = arrays.r
-        interval = OutputPrediction(
-            np.where(r > 0, np.nextafter(low - r, -np.inf), low),
-            np.where(r > 0, np.nextafter(high + r, np.inf), high),
-            used.C @ self.point,
-        )
-        return shifted(interval, used, u)
+        found = self._output(arrays)
+        lower, upper = widened(*self._image(arrays.C), arrays.r) if found is None else found[:2]
+        return shifted(OutputPrediction(lower, upper, self._output_point(used.C)), used, u)
 
     def update(
         self,
@@ -179,17 +171,9 @@ class ZonotopicKalman(Filter):
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
         C, (values, widths) = arrays.C, plain_strips(used, arrays, y, r=r, u=u, image=self._image)
-        known = ~np.isnan(values)
-        if known.any():
-            strips = Strips(np.array(C[known]), values[known], widths[known])
-            waiting = self._held.pending
+        if not np.isnan(values).all():
             try:
-                if self._excludes(strips):
-                    raise InconsistentData("the strips are proved to miss the zonotope")
-                if self._form == "filter":
-                    self._held = self._with_data(self._held, strips)
-                else:
-                    self._held = self._held._replace(pending=Strips(*map(_stacked, waiting, strips)))
+                self._held = self._cut(arrays, values, widths)
             except InconsistentData as contradiction:
                 raise strip_contradiction(used.outputs, *self._image(C), values, widths) from contradiction
             density = self._estimate.updated(
@@ -208,23 +192,7 @@ class ZonotopicKalman(Filter):
         used = same_states(self._model, model)
         arrays = self._arrays if model is None else step_arrays(used)
         center, widths = driven(used, arrays, u, rho=rho, bounds=self.bounds)
-        held = self._with_data(self._held, self._held.pending)
-        body = (held.c, held.H, np.zeros((0, held.H.shape[1])), np.zeros(0))
-        finite, moved, lower, upper = predict_constrained(
-            body, *_bounds(held), arrays.A, arrays.B, center, arrays.G, widths
-        )
-        if not finite:
-            raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
-        c, H = moved[0], moved[1] if self._order is None else box_shortest(moved[1], self._order, self._scaled)
-        least, most = map(np.array, _bounds(held))
-        keep_constants(least, most, arrays.A, arrays.B, center, arrays.G, widths, lower, upper)
-        if used.domain is not None:
-            lower, upper = np.maximum(lower, used.domain.lower), np.minimum(upper, used.domain.upper)
-        elif not self._has_box:
-            lower, upper = _everything(c.size)
-        held = Held(c=c, H=H, lower=lower, upper=upper, pending=_no_strips(c.size))
-        if _is_contradictory(held):
-            raise InconsistentData("the prediction is proved to miss the domain")
+        held = self._moved(used, arrays, center, widths)
         drive, density = Drive(center, widths, has_rho=rho is not None), self._held.density
         self._held = held
         density = self._estimate.predicted(density, used, arrays, drive, bounds=self.bounds)
@@ -259,7 +227,7 @@ class ZonotopicKalman(Filter):
         if self._excludes(strips) or self.support.intersect(other).is_empty():
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
         met = self._held._replace(lower=np.maximum(before[0], lower), upper=np.minimum(before[1], upper))
-        if _is_contradictory(met):
+        if is_contradictory(met):
             raise InconsistentData(f"the set of {self.kind} and the transferred set have no point in common")
         self._held = self._shrunk(met, strips)
         return hull_gain(before, self.bounds())
@@ -272,7 +240,7 @@ class ZonotopicKalman(Filter):
             body = given.interval_hull().to_constrained_zonotope()
         c, H, _, _ = body.arrays
         H = H if self._order is None else box_shortest(H, self._order, self._scaled)
-        self._held = Held(c, H, *given.bounds(), _no_strips(c.size), self._estimate.started(*given.bounds()))
+        self._held = Held(c, H, *given.bounds(), no_strips(c.size), self._estimate.started(*given.bounds()))
 
     def resume(self, support: Support, lower: Vector, upper: Vector) -> None:
         """Go on from a zonotope and a box; in the predictor form data that wait have to be given again."""
@@ -283,7 +251,7 @@ class ZonotopicKalman(Filter):
             H=support.generators.copy(),
             lower=lower,
             upper=upper,
-            pending=_no_strips(lower.size),
+            pending=no_strips(lower.size),
             density=self._estimate.started(lower, upper),
         )
 
@@ -306,29 +274,90 @@ class ZonotopicKalman(Filter):
             raise ModelError(f"the snapshot must be one of ZonotopicKalman, it is {type(snapshot).__name__}")
         self._held = snapshot
 
+    def _cut(self, arrays: KernelModel, values: Vector, widths: Vector) -> Held:
+        """The data update with the strips ``|values − C x| ≤ widths``, NaN for none."""
+        if self._form == "filter":
+            cut = self._stepped(
+                UPDATE, arrays, P=arrays.C, y=values, r=widths, u=np.zeros(arrays.B.shape[1]), widths=arrays.widths
+            )  # fmt: skip
+            if cut is not None:
+                return held_of(cut, self._held.density)
+        known = ~np.isnan(values)
+        strips, waiting = Strips(np.array(arrays.C[known]), values[known], widths[known]), self._held.pending
+        if self._excludes(strips):
+            raise InconsistentData("the strips are proved to miss the zonotope")
+        if self._form == "filter":
+            return self._with_data(self._held, strips)
+        return self._held._replace(pending=Strips(*map(stacked, waiting, strips)))
+
+    def _moved(self, model: LSUModel, arrays: KernelModel, u: Vector, widths: Vector) -> Held:
+        """The time update ``A X ⊕ B u ⊕ G box(widths)``, reduced."""
+        if self._form == "filter":
+            y = np.full(arrays.r.size, np.nan)
+            found = self._stepped(
+                PREDICT, arrays, P=arrays.C, y=y, r=arrays.r, u=u, widths=widths, domain=model.domain
+            )  # fmt: skip
+            if found is not None:
+                return held_of(found, None)
+        held = self._with_data(self._held, self._held.pending)
+        body = (held.c, held.H, np.zeros((0, held.H.shape[1])), np.zeros(0))
+        finite, moved, lower, upper = predict_constrained(
+            body, *bounds_of(held), arrays.A, arrays.B, u, arrays.G, widths
+        )
+        if not finite:
+            raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
+        c, H = moved[0], moved[1] if self._order is None else box_shortest(moved[1], self._order, self._scaled)
+        least, most = map(np.array, bounds_of(held))
+        keep_constants(least, most, arrays.A, arrays.B, u, arrays.G, widths, lower, upper)
+        if model.domain is not None:
+            lower, upper = np.maximum(lower, model.domain.lower), np.minimum(upper, model.domain.upper)
+        elif not self._has_box:
+            lower, upper = everything(c.size)
+        held = Held(c=c, H=H, lower=lower, upper=upper, pending=no_strips(c.size))
+        if is_contradictory(held):
+            raise InconsistentData("the prediction is proved to miss the domain")
+        return held
+
+    @property
+    def _packed(self) -> PackedSet:
+        c, H, lower, upper = self._held[:4]
+        return PackedSet((c, H, np.empty((0, H.shape[1])), np.empty(0)), lower, upper, is_hull=False)
+
+    def _hold_packed(self, held: PackedSet, density: Density | None) -> None:
+        self._held = held_of(held, density)
+
+    def snapshot_of(self, state: Vector) -> Held:
+        """The set of a row of a run."""
+        return held_of(unpacked(state, self._model.state_count), None)
+
+    @property
+    def has_compiled_loop(self) -> bool:
+        """In the form ``"filter"``, and with a limit of columns."""
+        return super().has_compiled_loop and self._form == "filter" and self._order is not None
+
     def _with_data(self, held: Held, strips: Strips) -> Held:
         """The data update of the zonotope, and of the box; no data wait any more."""
         if strips.y.size == 0:
             return held
         if self._has_box:
-            lower, upper = map(np.array, _bounds(held))
+            lower, upper = map(np.array, bounds_of(held))
             if tighten_all(lower, upper, strips.C, strips.y, strips.r):
                 raise InconsistentData("the strips are proved to miss the box beside the zonotope")
             held = held._replace(lower=lower, upper=upper)
-        new = _corrected(held, strips)
-        if _is_contradictory(new):
+        new = corrected_by(held, strips)
+        if is_contradictory(new):
             raise InconsistentData("the data are proved to contradict the set")
         return new
 
     def _shrunk(self, held: Held, strips: Strips) -> Held:
         """The zonotope corrected by strips for as long as its hull shrinks; data that wait go on waiting."""
         for sweep in range(MAX_SWEEPS):
-            shrunk = _corrected(held._replace(pending=_no_strips(held.c.size)), strips)._replace(pending=held.pending)
+            shrunk = corrected_by(held._replace(pending=no_strips(held.c.size)), strips)._replace(pending=held.pending)
             if self._order is not None:
                 shrunk = shrunk._replace(H=box_shortest(shrunk.H, self._order, self._scaled))
-            if not _size(shrunk) < _size(held):
+            if not size_of(shrunk) < size_of(held):
                 break
-            does_gain = hull_gain(_hull(held), _hull(shrunk)) >= SETTLED
+            does_gain = hull_gain(zonotope_hull(held), zonotope_hull(shrunk)) >= SETTLED
             if does_gain or sweep == 0:
                 held = shrunk
             if not does_gain:
@@ -348,48 +377,3 @@ class ZonotopicKalman(Filter):
         none = np.zeros((0, held.H.shape[1]))
         _, A, b = meet_strips(held.c, held.H, none, np.zeros(0), *strips)
         return is_proved_empty(A, b)
-
-
-def _corrected(held: Held, strips: Strips) -> Held:
-    """The data update; the box stays, and no data wait any more."""
-    if strips.y.size == 0:
-        return held
-    K = kalman_gain(held.H, strips.C, strips.r)
-    c, H, slack = corrected(held.c, held.H, strips.C, strips.y, strips.r, K)
-    H, _ = absorb_box(H, np.zeros((0, H.shape[1])), slack)
-    return held._replace(c=c, H=H, pending=_no_strips(c.size), met=None)
-
-
-def _hull(held: Held) -> tuple[Vector, Vector]:
-    """The hull of the zonotope alone."""
-    return Zonotope(held.c, held.H).bounds()
-
-
-def _bounds(held: Held) -> tuple[Vector, Vector]:
-    """The hull of the zonotope, met with the box."""
-    lower, upper = _hull(held)
-    return np.maximum(lower, held.lower), np.minimum(upper, held.upper)
-
-
-def _is_contradictory(held: Held) -> bool:
-    lower, upper = _bounds(held)
-    return bool((lower > upper).any())
-
-
-def _size(held: Held) -> float:
-    """Sum of the half-widths of the hull relative to the box, a scale-free measure of what a correction has gained."""
-    lower, upper = _hull(held)
-    widths = np.where(held.upper > held.lower, held.upper - held.lower, 1.0)
-    return float(((upper - lower) / widths).sum())
-
-
-def _no_strips(n: int) -> Strips:
-    return Strips(np.zeros((0, n)), np.zeros(0), np.zeros(0))
-
-
-def _everything(n: int) -> tuple[Vector, Vector]:
-    return np.full(n, -np.inf), np.full(n, np.inf)
-
-
-def _stacked(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.concatenate([one, other])

@@ -2,60 +2,28 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from lsu_mesh.array_types import Matrix, Stack, Vector
+from lsu_mesh.array_types import Matrix, Stack
 from lsu_mesh.kernels.filter_point import CENTRE, MEAN, locate, locate_output
 from lsu_mesh.kernels.filter_step import MEET_BOX, PREDICT, UPDATE, advance, copy, describe, predict_output
 from lsu_mesh.kernels.points import density
 from lsu_mesh.kernels.points.room import LOWER, TARGET, Room, row_of
-from lsu_mesh.kernels.runtime.compile import inlined, kernel
+from lsu_mesh.kernels.run_tables import (
+    DONE,
+    IN_PREDICT,
+    IN_UPDATE,
+    Estimates,
+    Models,
+    Record,
+    borrowed_models,
+    borrowed_record,
+    follow,
+)
+from lsu_mesh.kernels.runtime.compile import kernel
 from lsu_mesh.kernels.runtime.scratch import Scratch, spare_state
 from lsu_mesh.kernels.runtime.unowned_views import borrowed
-
-DONE = 0
-IN_UPDATE = 1
-IN_PREDICT = 2
-
-
-class Models(NamedTuple):
-    """Models of a bank: A (M, n, n), B (M, n, p), C (M, m, n), G (M, n, q), widths (M, q), r (M, m), domains (M, 2, n).
-
-    M = N, or M = 1 for all instances alike; domains (M, 0, n) where there is none. Q (M, n, n) is the covariance of the
-    noise of a step.
-    """
-
-    A: Stack
-    B: Stack
-    C: Stack
-    G: Stack
-    widths: Matrix
-    r: Matrix
-    domains: Stack
-    Q: Stack
-
-
-class Estimates(NamedTuple):
-    """The rule of the points, and densities means (N, n), covariances (N, n, n) beside the sets, for ``MEAN``."""
-
-    rule: int
-    means: Matrix
-    covariances: Stack
-
-
-class Record(NamedTuple):
-    """What a run stores: points, lower, upper (N, T, n), volumes (N, T), y_lower, y_upper, y_points (N, T, m)."""
-
-    points: Stack
-    lower: Stack
-    upper: Stack
-    volumes: Matrix
-    y_lower: Stack
-    y_upper: Stack
-    y_points: Stack
 
 
 @kernel
@@ -73,7 +41,7 @@ def sweep(
     The densities go along with the states; points are recorded only where ``points``.
     """
     rows = Y.shape[1]
-    models, record, work = _borrow_models(models), _borrow_record(record), borrowed(work)
+    models, record, work = borrowed_models(models), borrowed_record(record), borrowed(work)
     states, spare, Y, U = borrowed(states), borrowed(spare), borrowed(Y), borrowed(U)
     means, covariances, room = borrowed(estimates.means), borrowed(estimates.covariances), borrowed(room)
     bounded, rule = models.domains.shape[1] > 0, estimates.rule
@@ -109,7 +77,7 @@ def sweep(
             if action != PREDICT or not bounded:
                 copy(target, S)
             if rule == MEAN and action in (UPDATE, last_action):
-                _follow(action == UPDATE, mean, P, A, B, C, Y[i, k], r, U[i, k], models.Q[j], G, widths, room)
+                follow(action == UPDATE, mean, P, A, B, C, Y[i, k], r, U[i, k], models.Q[j], G, widths, room)
                 if not density.is_finite(mean, P):
                     hull = row_of(room, S.shape[1], LOWER), row_of(room, S.shape[1], LOWER + 1)
                     describe(family, S, row_of(room, S.shape[1], TARGET), hull[0], hull[1], work)
@@ -119,42 +87,3 @@ def sweep(
                 record.volumes[i, k] = describe(family, S, point, lower, upper, work)
                 if points and rule != CENTRE:
                     locate(family, rule, S, mean, P, lower, upper, point, room)
-
-
-@inlined
-def _follow(
-    updates: bool, mean: Vector, P: Matrix, A: Matrix, B: Matrix, C: Matrix, y: Vector, r: Vector, u: Vector,
-    Q: Matrix, G: Matrix, widths: Vector, room: Room,
-) -> None:  # fmt: skip
-    """The density, after a data update or a time update that has succeeded."""
-    if updates:
-        density.update(mean, P, C, y, r, r, room)
-    else:
-        density.predict(mean, P, A, B, u, Q, G, widths, widths.size, room)
-
-
-@inlined
-def _borrow_models(m: Models) -> Models:
-    return Models(
-        borrowed(m.A),
-        borrowed(m.B),
-        borrowed(m.C),
-        borrowed(m.G),
-        borrowed(m.widths),
-        borrowed(m.r),
-        borrowed(m.domains),
-        borrowed(m.Q),
-    )
-
-
-@inlined
-def _borrow_record(r: Record) -> Record:
-    return Record(
-        borrowed(r.points),
-        borrowed(r.lower),
-        borrowed(r.upper),
-        borrowed(r.volumes),
-        borrowed(r.y_lower),
-        borrowed(r.y_upper),
-        borrowed(r.y_points),
-    )

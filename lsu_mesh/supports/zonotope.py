@@ -49,6 +49,13 @@ class Zonotope(Support):
         columns = np.zeros((n, 0)) if columns.size == 0 else columns
         self._generators = np.array(finite_array("generators", columns, (n, None)))
 
+    @classmethod
+    def of_arrays(cls, center: Vector, generators: Matrix) -> Zonotope:
+        """A set of writable contiguous arrays that kernels made: no copy, no check."""
+        made = cls.__new__(cls)
+        made._center, made._generators = center, generators
+        return made
+
     @property
     def dim(self) -> int:
         """n"""

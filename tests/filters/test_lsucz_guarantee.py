@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lsu_mesh import LSUCZ, InconsistentData, LSUModel, Orthotope, ZonotopicKalman, systems
 from lsu_mesh.filters.filter import Filter
-from lsu_mesh.supports import reduction
+from lsu_mesh.kernels.set_run import UPDATE
 from lsu_mesh.supports.exact import Membership
-from lsu_mesh.supports.linear_programs import Maxima
 from lsu_mesh.testing.exact_plant import Case, Exact, exact_product, exact_steps, inside_box
 
 Maker = Callable[[LSUModel, Orthotope], Filter]
@@ -84,13 +84,15 @@ def test_a_scaled_copy_gives_the_scaled_sets_bit_by_bit(name: str, exponent: int
 
 
 def test_the_check_notices_a_bound_that_is_a_billionth_too_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    honest = reduction.program_maxima
+    honest = LSUCZ._stepped
 
-    def shrunk(*program: object, **constraints: object) -> Maxima:
-        found = honest(*program, **constraints)  # type: ignore[arg-type]
-        return found._replace(values=found.values - 1e-9 * np.abs(found.values))
+    def shrunk(self: LSUCZ, action: int, *given: Any, **options: Any) -> Any:
+        held = honest(self, action, *given, **options)
+        assert held is not None
+        lower, upper = held.lower + 1e-9 * np.abs(held.lower), held.upper - 1e-9 * np.abs(held.upper)
+        return held._replace(lower=lower, upper=upper) if action == UPDATE else held
 
-    monkeypatch.setattr(reduction, "program_maxima", shrunk)
+    monkeypatch.setattr(LSUCZ, "_stepped", shrunk)
     monkeypatch.setitem(MAKERS, "shrunk", LSUCZ)
     case = Case(LSUModel([[0.9]], None, [[1.0]], 0.1, 10.0), Orthotope([-1.0], [1.0]), inside=False)
     with pytest.raises((AssertionError, InconsistentData)):

@@ -12,7 +12,7 @@ from lsu_mesh.experiments.kernel_speed import plain_numpy
 from lsu_mesh.experiments.kernel_speed.other_libraries import installed, kalman_step
 from lsu_mesh.experiments.kernel_speed.stopwatch import Candidate, compare
 from lsu_mesh.filters.bank import FilterBank
-from lsu_mesh.filters.compiled import CompiledFilter
+from lsu_mesh.filters.compiled_loop import CompiledLoop
 from lsu_mesh.filters.filter import Filter
 from lsu_mesh.filters.registry import filter_class
 from lsu_mesh.filters.run import run_filter
@@ -81,9 +81,9 @@ def _cost(kind: str, n: int, rounds: int, seconds: float) -> StepCost:
     data = simulate(model, LOOP_ROWS, seed=1)
     candidates = {"single": _one_by_one(kind, model, data)}
     kind_class: Any = filter_class(kind)
-    if issubclass(kind_class, CompiledFilter):
-        candidates["loop"] = _loop(kind_class(model, prior, point="centre"), data)
-        candidates["bank"] = _bank(kind_class, model, BANK_INSTANCES, BANK_ROWS)
+    options = options_of(kind, n)
+    candidates["loop"] = _loop(kind_class(model, prior, point="centre", **options), data)
+    candidates["bank"] = _bank(kind_class, model, BANK_INSTANCES, BANK_ROWS, **options)
     if kind in PLAIN:
         candidates["numpy"] = Candidate(lambda: plain_run(kind, model, data, PLAIN_ROWS), PLAIN_ROWS)
     if kind == "ZonotopicKalman" and installed("filterpy"):
@@ -135,22 +135,22 @@ def _one_by_one(kind: str, model: LSUModel, data: Simulation) -> Candidate:
     return Candidate(again, SINGLE_ROWS)
 
 
-def _loop(engine: Filter, data: Simulation) -> Candidate:
+def _loop(engine: CompiledLoop, data: Simulation) -> Candidate:
     start = engine.snapshot()
 
     def again() -> None:
         engine.restore(start)
-        run_filter(engine, data.Y, data.U)
+        run_filter(engine, data.Y, data.U, volumes=None if engine.has_compiled_volumes else False)
 
     return Candidate(again, len(data.Y))
 
 
-def _bank(kind: Any, model: LSUModel, instances: int, rows: int) -> Candidate:
+def _bank(kind: Any, model: LSUModel, instances: int, rows: int, **options: int) -> Candidate:
     """A plant at rest with noisy outputs, other noise for each instance; runs continue from the sets before."""
     random = np.random.default_rng(1)
     Y = random.uniform(-1.0, 1.0, (instances, rows, model.output_count)) * model.r
     U = np.zeros((instances, rows, model.input_count))
-    bank = FilterBank(kind, model, [unit_box(model.state_count)] * instances, threads=1, point="centre")
+    bank = FilterBank(kind, model, [unit_box(model.state_count)] * instances, threads=1, point="centre", **options)
 
     def again() -> None:
         _, done = bank.run(Y, U)
