@@ -29,9 +29,8 @@ NOTES = """## How to read it
   are LSUO, LSUP and LSUCZ in turn. The generators of LSUCZ grow with the states beyond 12, to n + 8.
 - **Instances**: a bank of LSUO on P3, one thread; the cost is that of a step of all instances.
 - **Exponent**: p of cost ∝ size^p over the upper half of the sizes; what does not grow dominates small ones.
-- **Projected** is not measured: of processes it is a line through the points that kept up with their steps (all of
-  them, if fewer than two did), of all else the exponent from the largest size on. No projection knows of busy
-  processors, of full caches, or of a full link.
+- **Projected** is not measured: of processes it is a line through the points that kept up with their steps, of all else
+  the exponent from the largest size on. No projection knows of busy processors, of full caches, or of a full link.
 """
 
 
@@ -41,9 +40,8 @@ def scale_page(costs: Sequence[Cost], *, date: str, commit: str | None, machine:
     parts = [HEAD, f"Measured on {date[:10]}, commit {commit or 'unknown'}: {facts}.\n"]
     kinds = list(dict.fromkeys(cost.what for cost in costs))
     parts += [_section(what, [cost for cost in costs if cost.what == what]) for what in kinds]
-    processes = [cost for cost in costs if cost.what == PROCESSES]
-    if len(processes) > 1:
-        parts.append(_cores(_points_of_line(processes)))
+    sound = _sound_points([cost for cost in costs if cost.what == PROCESSES])
+    parts += [_cores(sound)] if len(sound) > 1 else []
     return "\n".join([*parts, NOTES])
 
 
@@ -52,16 +50,14 @@ def _section(what: str, costs: Sequence[Cost]) -> str:
     rows = [(f"{cost.count}", _number(cost.cost), _number(cost.cost / costs[0].cost), _basis(cost)) for cost in costs]
     end = ""
     if len(points) > 1:
-        grows = f"exponent {exponent(points):.2f}"
         if what.startswith("processes"):
-            line = fitted_line(_points_of_line(costs))
-            end = f"\nA line: {_number(line.fixed)} and {_number(line.each)} for each process; {grows}.\n"
+            end = _line_words(costs)
         else:
             for factor in FURTHER:
                 count = factor * costs[-1].count
                 cost = projected(points, count)
                 rows.append((f"{count}", _number(cost), _number(cost / costs[0].cost), "projected"))
-            end = f"\nGrowth: {grows}.\n"
+            end = f"\nGrowth: exponent {exponent(points):.2f}.\n"
     head = f"## {what[0].upper()}{what[1:]}\n| {what} | {costs[0].unit} | ÷ the first | |\n|---|---|---|---|\n"
     return head + "".join(f"| {' | '.join(row)} |\n" for row in rows) + end
 
@@ -70,10 +66,18 @@ def _basis(cost: Cost) -> str:
     return "measured" if cost.kept_up else "measured; it lost steps, which cost nothing"
 
 
-def _points_of_line(costs: Sequence[Cost]) -> list[tuple[float, float]]:
-    """Those that kept up with their steps, or all of them where these are too few for a line."""
-    sound = [cost for cost in costs if cost.kept_up]
-    return [(float(cost.count), cost.cost) for cost in (sound if len(sound) > 1 else costs)]
+def _sound_points(costs: Sequence[Cost]) -> list[tuple[float, float]]:
+    """Those that kept up with their steps."""
+    return [(float(cost.count), cost.cost) for cost in costs if cost.kept_up]
+
+
+def _line_words(costs: Sequence[Cost]) -> str:
+    sound = _sound_points(costs)
+    if len(sound) < 2:
+        return "\nFewer than two of them kept up with their steps on this busy machine: nothing is projected.\n"
+    line = fitted_line(sound)
+    words = f"{_number(line.fixed)} and {_number(line.each)} for each process; exponent {exponent(sound):.2f}"
+    return f"\nA line: {words}.\n"
 
 
 def _cores(points: Sequence[tuple[float, float]]) -> str:

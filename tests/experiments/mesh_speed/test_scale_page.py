@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from lsu_mesh.experiments.mesh_speed.scale import BANK, PROCESSES, Cost
-from lsu_mesh.experiments.mesh_speed.scale_page import scale_page
+from lsu_mesh.experiments.mesh_speed.scale_page import HEAD, NOTES, scale_page
 
 MS, US = "processor ms a step of all", "µs a step of all"
 COSTS = [Cost(PROCESSES, count, 2.0 + 0.5 * count, MS) for count in (6, 9, 13, 17)]
@@ -33,3 +35,16 @@ def test_a_mesh_that_lost_steps_does_not_bend_the_line() -> None:
     lines = scale_page(costs, date="2026-11-30", commit=None, machine={}).splitlines()
     assert "| 25 | 3 | 0.6 | measured; it lost steps, which cost nothing |" in lines
     assert "| 24 | 0.825 | 3.3 | projected |" in lines
+
+
+def test_nothing_is_projected_from_meshes_that_lost_steps() -> None:
+    costs = [COSTS[0], *(Cost(PROCESSES, count, 3.0, MS, kept_up=False) for count in (9, 13))]
+    text = scale_page(costs, date="2026-11-30", commit=None, machine={})
+    assert "nothing is projected" in text
+    assert "projected |" not in text
+
+
+def test_the_page_in_the_docs_is_of_this_form(root: Path) -> None:
+    text = (root / "docs" / "scaling.md").read_text(encoding="utf-8")
+    assert text.startswith(HEAD)
+    assert text.endswith(NOTES)
