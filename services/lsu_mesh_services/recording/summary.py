@@ -65,7 +65,7 @@ class Summary:
     """The same in rows of messages with the steps between which they lie, the first ones."""
 
 
-class _Head(msgspec.Struct):
+class _Head(msgspec.Struct, gc=False):
     """Fields of a message that are counted."""
 
     boot: str
