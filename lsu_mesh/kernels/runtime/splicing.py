@@ -6,18 +6,28 @@ lines become lines of its one caller.
 
 from __future__ import annotations
 
-from typing import cast
-
-import numba
+import functools
+from typing import Any, cast
 
 from lsu_mesh.kernels.runtime import compile as compiling
 
 
+class Spliced(compiling.Kernel):
+    """A function whose lines numba takes into each kernel that calls it; it has no machine code of its own."""
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """What numba knows the function by; imports numba when it is first asked for."""
+        import numba
+
+        return numba.njit(inline="always", **compiling._OPTIONS)(self.py_func)
+
+
 def entry(function: compiling.F) -> compiling.F:
     """As ``kernel``, for one that only calls others: these are optimised already."""
-    return compiling._compiled(function, {}, optimisation=1)
+    return cast("compiling.F", compiling.Kernel(function, {}, optimisation=1))
 
 
 def spliced(function: compiling.F) -> compiling.F:
     """A function whose lines become lines of each caller; it should have one."""
-    return cast("compiling.F", numba.njit(inline="always", **compiling._OPTIONS)(function))
+    return cast("compiling.F", Spliced(function, {}, optimisation=1))
