@@ -14,6 +14,7 @@ import msgpack
 import numpy as np
 import psutil
 import pytest
+from lsu_mesh_services.exit_codes import USAGE
 
 pytestmark = pytest.mark.live
 
@@ -188,3 +189,12 @@ def _catches(pid: int) -> bool:
     status = Path(f"/proc/{pid}/status").read_text()
     caught = next(line for line in status.splitlines() if line.startswith("SigCgt:"))
     return bool(int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1)
+
+
+def test_options_that_only_the_class_of_a_filter_refuses_are_said_once(start_run) -> None:  # type: ignore[no-untyped-def]
+    """The launcher makes no filter, so that it needs no kernel; the filter says it, and nobody is started again."""
+    session = start_run("--no-record", "-X", "filters.cz.max_generators=1")
+    assert session.wait() == USAGE, session.output[1]
+    assert session.output[1].count("must be at least 3, the number of states, it is 1") == 1
+    assert "was started again" not in session.output[1]
+    assert not session.children()
