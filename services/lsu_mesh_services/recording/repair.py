@@ -162,7 +162,10 @@ def _check_drawing(batch: pa.RecordBatch, store: bytes) -> None:
         if module.startswith("rerun.") and not hasattr(KINDS.get(module), kind):
             raise ValueError(f"{module}.{kind} is nothing that is drawn")
     name = (batch.schema.metadata or {}).get(b"rerun:id", b"").decode()
-    chunks = Chunk.from_record_batch(batch)
+    try:
+        chunks = Chunk.from_record_batch(batch)
+    except (RuntimeError, TypeError, pa.ArrowException) as error:  # names in it may be no text
+        raise ValueError(str(error)) from None
     if len(chunks) != 1 or not name.lower().endswith(str(chunks[0].id).removeprefix("chunk_").lower()):
         raise ValueError(f"{name} is no chunk")
 
