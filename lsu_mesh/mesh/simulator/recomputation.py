@@ -63,8 +63,17 @@ class Recomputation:
                 self._late.setdefault(node.boot, set()).add(message.step)
 
     def check(self, node: Node, newest: dict[int, Posterior]) -> None:
-        """The newest set of each step that got something late is what its data make of the set before."""
-        for k in sorted(self._late.pop(node.boot, ())):
+        """The newest set of each step that got something late is what its data make of the set before.
+
+        A step that the node has still to do again waits: the data may await an input that they see.
+        """
+        late = self._late.pop(node.boot, set())
+        if isinstance(node, FilterNode) and node.current is not None:
+            waiting = {k for k in late if not node.timeline.is_over(k)}
+            if waiting:
+                self._late[node.boot] = waiting
+                late -= waiting
+        for k in sorted(late):
             before, found = newest.get(k - 1), newest.get(k)
             if before is None or found is None or {before.boot, found.boot} != {node.boot}:
                 continue
