@@ -32,7 +32,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("filter_point",),
         ("batch_run", "set_run"),
     ],
-    "lsu_mesh.kernels.runtime": [("compile", "unowned_views"), (REST,)],
+    "lsu_mesh.kernels.runtime": [("compile", "unowned_views"), ("splicing",), (REST,)],
     "lsu_mesh.kernels.linear_programs": [
         ("banded_program", "bordered_systems", "dual_bound", "simplex"),
         ("newton_step", "safe_maxima"),
