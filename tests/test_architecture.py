@@ -43,7 +43,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("enclosure",),
     ],
     "lsu_mesh.nonlinear": [("graph",), ("functions", "language", "periodic"), ("model",), ("steps",)],
-    "lsu_mesh.kernels.runtime": [("compile", "unowned_views"), (REST,)],
+    "lsu_mesh.kernels.runtime": [("compile", "unowned_views"), ("splicing",), (REST,)],
     "lsu_mesh.kernels.linear_programs": [
         ("banded_program", "bordered_systems", "dual_bound", "simplex"),
         ("newton_step", "safe_maxima"),

@@ -74,7 +74,7 @@ def sweep(
         A, B, C, G = models.A[j], models.B[j], models.C[j], models.G[j]
         widths, r, domain = models.widths[j], models.r[j], models.domains[j]
         mean, P = estimates.means[i], estimates.covariances[i]
-        body, lower, upper, is_hull = unpack(states[i], A.shape[1])
+        body, lower, upper, is_hull = unpack(states[i], C.shape[1])
         outcome[i, 0], outcome[i, 1] = rows, DONE
         for turn in range(3 * rows):
             k, action = turn // 3, 1 << (turn % 3)

@@ -14,6 +14,7 @@ import numpy as np
 from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner, kernel
 from lsu_mesh.kernels.runtime.rounding import gamma, up
+from lsu_mesh.kernels.runtime.rows import subtract_from
 
 
 @kernel
@@ -58,9 +59,7 @@ def dual_bound_in(d: Array, A: Array, b: Array, reach: Array, row_sums: Array, y
     for i in range(m):
         factor = y[i] if finite else 0.0
         if factor != 0.0:
-            row = A[i]
-            for j in range(g):
-                reduced[j] -= row[j] * factor
+            subtract_from(reduced, A, i, factor)
             level += b[i] * factor
             mass += abs(factor) * (row_sums[i] + abs(b[i]))
     spread = 0.0

@@ -18,6 +18,7 @@ import numpy as np
 
 from lsu_mesh.array_types import Array, Indices
 from lsu_mesh.kernels.runtime.compile import inlined, inner
+from lsu_mesh.kernels.runtime.rows import scale_row, subtract_from, subtract_row
 from lsu_mesh.kernels.runtime.scaling import unit_factor
 
 FEASIBLE = 1e-12
@@ -81,10 +82,9 @@ def canonical_tableau(A: Array, reach: Array) -> tuple[Array, Indices]:
         best, p, q = DEPENDENT, -1, -1
         for i in range(m):
             if basis[i] < 0:
-                row = T[i]
                 for j in range(g):
-                    if abs(row[j]) * reach[j] > best:
-                        best, p, q = abs(row[j]) * reach[j], i, j
+                    if abs(T[i, j]) * reach[j] > best:
+                        best, p, q = abs(T[i, j]) * reach[j], i, j
         if p < 0:
             break
         basis[p] = q
@@ -120,21 +120,13 @@ def refactor(A: Array, T: Array, basis: Indices) -> None:
 @inner
 def pivot_rows(T: Array, p: int, q: int) -> None:
     """Make column q the unit vector of row p."""
-    m, width = T.shape
-    row = T[p]
-    inverse = 1.0 / row[q]
-    for j in range(width):
-        row[j] *= inverse
-    row[q] = 1.0
-    for i in range(m):
-        if i == p:
-            continue
-        other = T[i]
-        factor = other[q]
-        if factor != 0.0:
-            for j in range(width):
-                other[j] -= factor * row[j]
-            other[q] = 0.0
+    scale_row(T, p, 1.0 / T[p, q])
+    T[p, q] = 1.0
+    for i in range(T.shape[0]):
+        factor = T[i, q]
+        if i != p and factor != 0.0:
+            subtract_row(T, i, p, factor)
+            T[i, q] = 0.0
 
 
 @inner
@@ -172,12 +164,11 @@ def basic_levels(T: Array, b: Array, basis: Indices, at: Array, level: Array) ->
         if basis[i] >= 0:
             at[basis[i]] = 0.0
     for i in range(m):
-        row = T[i]
         total = 0.0
         for k in range(m):
-            total += row[g + k] * b[k]
+            total += T[i, g + k] * b[k]
         for j in range(g):
-            total -= row[j] * at[j]
+            total -= T[i, j] * at[j]
         level[i] = total
 
 
@@ -274,20 +265,18 @@ def find_vertex(T: Array, basis: Indices, reach: Array, at: Array, level: Array,
     """
     m = T.shape[0]
     g = at.size
-    reduced = np.empty(g)
+    reduced = np.empty(g + m)
     idle = 0
     for _ in range(200 + 20 * (m + g)):
         beyond = False
-        for j in range(g):
+        for j in range(g + m):
             reduced[j] = 0.0
         for i in range(m):
             sigma[i] = 0.0
             if basis[i] >= 0 and abs(level[i]) > reach[basis[i]] + tolerance(reach[basis[i]]):
                 beyond = True
                 sigma[i] = 1.0 if level[i] > 0.0 else -1.0
-                row = T[i]
-                for j in range(g):
-                    reduced[j] += sigma[i] * row[j]
+                subtract_from(reduced, T, i, -sigma[i])
         if not beyond:
             return True
         bland = idle > m + g
@@ -319,9 +308,7 @@ def climb(T: Array, basis: Indices, reach: Array, at: Array, level: Array, d: Ar
         if basis[i] >= 0:
             cost = d[basis[i]]
             if cost != 0.0:
-                row = T[i]
-                for j in range(g + m):
-                    reduced[j] -= cost * row[j]
+                subtract_from(reduced, T, i, cost)
     idle = 0
     optimal = False
     for _ in range(200 + 20 * (m + g)):
@@ -335,10 +322,7 @@ def climb(T: Array, basis: Indices, reach: Array, at: Array, level: Array, d: Ar
         idle = idle + 1 if step <= tolerance(reach[q]) else 0
         exchange(T, basis, reach, at, level, q, sign, row_out, step)
         if row_out >= 0:
-            factor = reduced[q]
-            row = T[row_out]
-            for j in range(g + m):
-                reduced[j] -= factor * row[j]
+            subtract_from(reduced, T, row_out, reduced[q])
             reduced[q] = 0.0
     for i in range(m):
         y[i] = -reduced[g + i]
@@ -359,6 +343,5 @@ def refine_multipliers(A: Array, T: Array, basis: Indices, d: Array, y: Array) -
             residual[i] = left
     for i in range(m):
         if residual[i] != 0.0:
-            row = T[i]
             for k in range(m):
-                y[k] += row[g + k] * residual[i]
+                y[k] += T[i, g + k] * residual[i]

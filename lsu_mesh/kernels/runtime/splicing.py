@@ -31,3 +31,33 @@ def entry(function: compiling.F) -> compiling.F:
 def spliced(function: compiling.F) -> compiling.F:
     """A function whose lines become lines of each caller; it should have one."""
     return cast("compiling.F", Spliced(function, {}, optimisation=1))
+
+
+class Vectorised(compiling.Kernel):
+    """A kernel in which the compiler may turn loops into operations on vectors."""
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
+        """As of every kernel."""
+        from numba.core import config as numba_config
+
+        config: Any = numba_config
+        made = compiling._compiled(self.py_func, compiling._NO_WRAPPERS, optimisation=3)
+        compile_signature = type(made).compile.__get__(made)
+
+        def compile_long_loops(signature: Any) -> Any:
+            compiling._load_registries_without_scipy()
+            before = config.OPT, config.LOOP_VECTORIZE
+            config.OPT, config.LOOP_VECTORIZE = type(config.OPT)(3), 1
+            try:
+                return compile_signature(signature)
+            finally:
+                config.OPT, config.LOOP_VECTORIZE = before
+
+        made.compile = compile_long_loops
+        return made
+
+
+def vectorised(function: compiling.F) -> compiling.F:
+    """As ``inner``, for a loop over many entries, elementwise: vectors of them give the bits of one after the other."""
+    return cast("compiling.F", Vectorised(function, {}, optimisation=3))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lsu_mesh.array_types import Array
 from lsu_mesh.kernels.runtime.compile import inner
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
+from lsu_mesh.kernels.runtime.rows import subtract_row
 from lsu_mesh.kernels.zonotopes.lifted_zonotope import row_scales
 
 MIN_PIVOT = 2.0**-10
@@ -93,17 +94,14 @@ def movability(n: int, L: Array) -> Array:
                 S[i, i] = np.sqrt(total) if total > 1e-12 * whole else 0.0
     freedom = np.ones(g)
     for i in range(N):  # forward substitution for all columns at once
-        row = W[i]
         for k in range(i):
             factor = S[i, k]
             if factor != 0.0:
-                other = W[k]
-                for j in range(g):
-                    row[j] -= factor * other[j]
+                subtract_row(W, i, k, factor)
         inverse = 1.0 / S[i, i] if S[i, i] > 0.0 else 0.0
         for j in range(g):
-            row[j] *= inverse
-            freedom[j] -= row[j] * row[j]
+            W[i, j] *= inverse
+            freedom[j] -= W[i, j] * W[i, j]
     return freedom
 
 
@@ -116,20 +114,18 @@ def eliminate(L: Array, middle: Array, slack: Array, i: int, j: int) -> None:
     """
     N, g = L.shape
     pivot = L[i, j]
-    source = L[i]
     for s in range(N):
         if s == i or L[s, j] == 0.0:
             continue
         factor = L[s, j] / pivot
-        target = L[s]
         product = factor * middle[i]
         lost = abs(middle[s]) + 2.0 * abs(product)
         middle[s] -= product
         for k in range(g):
-            product = factor * source[k]
-            lost += abs(target[k]) + 2.0 * abs(product)
-            target[k] -= product
-        target[j] = 0.0
+            product = factor * L[i, k]
+            lost += abs(L[s, k]) + 2.0 * abs(product)
+            L[s, k] -= product
+        L[s, j] = 0.0
         slack[s] = up(up(slack[s] + up(abs(factor) * slack[i])) + up(lost * gamma(1) + UNDERFLOW))
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from lsu_mesh.array_types import Array, Indices
 from lsu_mesh.kernels.runtime.compile import inner
 from lsu_mesh.kernels.runtime.rounding import UNDERFLOW, gamma, up
+from lsu_mesh.kernels.runtime.rows import add_row_of, subtract_row
 from lsu_mesh.kernels.runtime.scaling import unit_factor
 from lsu_mesh.kernels.zonotopes.lifted_zonotope import row_scales
 
@@ -81,22 +82,17 @@ def independent_columns(L: Array) -> tuple[Array, Indices]:
         best, p, q = MIN_PIVOT, -1, -1
         for i in range(N):
             if origin[i] < 0:
-                row = W[i]
                 for j in range(g):
-                    if abs(row[j]) > best:
-                        best, p, q = abs(row[j]), i, j
+                    if abs(W[i, j]) > best:
+                        best, p, q = abs(W[i, j]), i, j
         if p < 0:
             break
         origin[p] = q
-        source = W[p]
         for i in range(N):
             D[i, p] = L[i, q]
             if origin[i] < 0 and W[i, q] != 0.0:
-                row = W[i]
-                factor = row[q] / source[q]
-                for j in range(g):
-                    row[j] -= factor * source[j]
-                row[q] = 0.0
+                subtract_row(W, i, p, W[i, q] / W[p, q])
+                W[i, q] = 0.0
     for i in range(N):
         if origin[i] < 0:
             D[i, i] = max(FLOOR * scale[i], SHORTEST)
@@ -124,16 +120,13 @@ def approximate_inverse(D: Array) -> Array:
         if p != k:
             for j in range(2 * N):
                 W[p, j], W[k, j] = W[k, j], W[p, j]
-        source = W[k]
-        pivot = source[k]
+        pivot = W[k, k]
         for j in range(2 * N):
-            source[j] /= pivot
+            W[k, j] /= pivot
         for i in range(N):
-            row = W[i]
-            factor = row[k]
+            factor = W[i, k]
             if i != k and factor != 0.0:
-                for j in range(2 * N):
-                    row[j] -= factor * source[j]
+                subtract_row(W, i, k, factor)
     M = np.empty((N, N))
     for i in range(N):
         for j in range(N):
@@ -147,13 +140,10 @@ def _coordinates(M: Array, L: Array) -> Array:
     N, g = L.shape
     T = np.zeros((N, g))
     for i in range(N):
-        target = T[i]
         for s in range(N):
             factor = M[i, s]
             if factor != 0.0:
-                source = L[s]
-                for j in range(g):
-                    target[j] += factor * source[j]
+                add_row_of(T, i, L, s, factor)
     return T
 
 

@@ -74,6 +74,9 @@ def correct(
     hull = zonotope_bounds(centre, columns, least, most)
     if is_void(hull[0], hull[1]):
         return EMPTY, c, H, lower, upper
+    for i in range(c.size):
+        if np.isnan(hull[0][i]) or np.isnan(hull[1][i]):
+            return TROUBLED, c, H, lower, upper
     return DONE, centre, columns, least, most
 
 
