@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from lsu_mesh.experiments.machine_facts import Facts
 from lsu_mesh.experiments.mesh_speed.growth import exponent, fitted_line, projected
-from lsu_mesh.experiments.mesh_speed.mesh_case import MAX_FILTERS
 from lsu_mesh.experiments.mesh_speed.scale import PROCESSES, Cost
 
 PROJECTED_FILTERS = (6, 12, 24, 48)
@@ -87,7 +86,7 @@ def _cores(points: Sequence[tuple[float, float]]) -> str:
     text = f"## Cores that a mesh keeps busy\n| filters | {heads} | |\n|---|{'---|' * len(RATES)}---|\n"
     for filters in PROJECTED_FILTERS:
         cores = [_number(max(0.0, line.at(filters + OTHER_PEERS)) * rate / 1000) for rate in RATES]
-        basis = "between measured sizes" if filters <= MAX_FILTERS else "projected"
+        basis = "between measured sizes" if filters + OTHER_PEERS <= points[-1][0] else "projected"
         text += f"| {filters} | {' | '.join(cores)} | {basis} |\n"
     return text + (
         "\nProcessor time of all processes on the machine of this run. It was measured at 50 Hz; other rates assume\n"
