@@ -29,7 +29,11 @@ class Presence:
         self.unproved: list[str] = []
         self._newest: dict[tuple[str, str], int] = {}
         """The newest epoch of each process that any message speaks of."""
+        self._sets: dict[str, dict[str, list[Posterior]]] = {}
+        """What each process of a filter or fusion published."""
         for message in archive.messages(Message):
+            if isinstance(message, Posterior):
+                self._sets.setdefault(message.name, {}).setdefault(message.boot, []).append(message)
             if isinstance(message, Posterior | Prediction):
                 for src, boot, number in [(message.src, message.boot, message.epoch), *message.descent]:
                     self._newest[src, boot] = max(number, self._newest.get((src, boot), 0))
@@ -79,11 +83,22 @@ class Presence:
             if name in message.missing or name in used or name in rejected:
                 continue
             if not self._archive.of_step(name, message.step):
-                yield FalseClaim(message, "missing", f"{name} in it: it sent nothing of this step")
+                if self._sent_nothing(name, message.step):
+                    yield FalseClaim(message, "missing", f"{name} in it: it sent nothing of this step")
+                else:
+                    self.unproved.append(f"missing: what {name} sent, because the recorder missed some of it")
             elif used:
                 yield FalseClaim(message, "rejected", f"{name} in it: it was there and was not used")
             else:
                 self.unproved.append(f"rejected: why nothing of {name} was used")
+
+    def _sent_nothing(self, name: str, step: int) -> bool:
+        """Whether a process of the source published before and behind a step of which nothing came, without a gap."""
+        for sets in self._sets.get(name, {}).values():
+            steps, numbers = [one.step for one in sets], {one.seq for one in sets}
+            if min(steps) < step < max(steps) and len(numbers) == max(numbers) - min(numbers) + 1:
+                return True
+        return False
 
     def _check_rejected(self, message: Fused, recomputed: Recomputed | None, used: set[str]) -> Iterator[FalseClaim]:
         settings = self._configuration.fusion[message.name]

@@ -202,3 +202,24 @@ def test_what_only_the_process_knows_is_counted_by_name(module_mesh: MakeMesh) -
     found = verify(configuration, recorded(mesh))
     assert found.holds
     assert found.unproved["missing: whether what s1 sent came late or never"] >= 1
+
+
+@pytest.mark.parametrize("is_whole", [True, False], ids=["it published no set of the step", "the recorder missed it"])
+def test_a_source_that_a_set_does_not_speak_of_sent_nothing_or_is_not_recorded(plain: Any, is_whole: bool) -> None:
+    def of_para(message: Message) -> bool:
+        return isinstance(message, Posterior) and message.name == "para"
+
+    messages = [one for one in recorded(plain) if one.name != "para" or one.step != STEP]
+    if is_whole:
+        messages = [
+            structs.replace(one, seq=one.seq - 1) if of_para(one) and one.step > STEP else one for one in messages
+        ]
+    at = next(i for i, one in enumerate(messages) if isinstance(one, Fused) and one.step == STEP)
+    fused = messages[at]
+    assert isinstance(fused, Fused)
+    used = [reference for reference in fused.used if reference[1] != "filter/para"]
+    messages[at] = structs.replace(fused, used=used)
+    found = verify(plain.configuration, messages)
+    claims = [one for one in found.false_claims if (one.peer, one.step, one.field) == ("fusion/main", STEP, "missing")]
+    words = "missing: what para sent, because the recorder missed some of it"
+    assert (len(claims), found.unproved[words]) == ((1, 0) if is_whole else (0, 1))
