@@ -130,7 +130,7 @@ def _copy_chunk(frame: Frame, source: Path, file: BinaryIO | None, damage: Damag
         if not entity.startswith(RAW):
             _check_drawing(batch, store)
             if file is not None:
-                frame.write(file)
+                with_batch(frame, batch).write(file)  # Rerun is stricter than Arrow with what is compressed
             return 0
         rows, good = read_rows(entity, batch)
     except ValueError:
