@@ -50,12 +50,11 @@ def _are_parallel(L: Array, i: int, j: int, p: int, scale: Array) -> bool:
     t = L[p, j] / L[p, i]
     if not np.isfinite(t):
         return False
-    most, bound = 0.0, PARALLEL * abs(L[p, j]) / scale[p]
-    for s in range(L.shape[0]):
-        if scale[s] > 0.0:
-            most = max(most, abs(L[s, j] - t * L[s, i]) / scale[s])
-    is_small: bool = most <= bound
-    return is_small
+    bound = PARALLEL * abs(L[p, j]) / scale[p]
+    for s in range(L.shape[0]):  # noqa: SIM110 (kernels have no generators)
+        if scale[s] > 0.0 and abs(L[s, j] - t * L[s, i]) / scale[s] > bound:
+            return False
+    return True
 
 
 @inner
