@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -233,6 +233,18 @@ def batch_of(stream: pa.Buffer) -> tuple[str, pa.RecordBatch]:
         return metadata[b"rerun:entity_path"].decode(), batch
     except (OSError, KeyError, StopIteration, UnicodeDecodeError, MemoryError, pa.ArrowException) as error:
         raise ValueError(f"{type(error).__name__}: {error}") from None
+
+
+def check_texts(metadata: Mapping[bytes, bytes], fields: Sequence[pa.Field]) -> None:
+    """Raises ``ValueError`` where a name is no text: Rerun ends the process for that."""
+    for text in (*metadata.keys(), *metadata.values()):
+        text.decode()
+    for field in fields:
+        if not isinstance(field.name, str):
+            raise ValueError("a column without a name")
+        kind = field.type
+        inner = [kind.field(i) for i in range(kind.num_fields)] if pa.types.is_nested(kind) else []
+        check_texts(field.metadata or {}, inner)
 
 
 def new_store(store: bytes) -> Frame:

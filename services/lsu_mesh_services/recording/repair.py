@@ -30,6 +30,7 @@ from lsu_mesh_services.recording.container import (
     Frame,
     Hole,
     batch_of,
+    check_texts,
     fields_of,
     frames,
     new_store,
@@ -157,6 +158,7 @@ def _check_drawing(batch: pa.RecordBatch, store: bytes) -> None:
     """Raises ``ValueError`` where Rerun takes these rows for no chunk, or for another one, or of another store."""
     if store:
         raise ValueError("the name of the store is damaged")
+    check_texts(batch.schema.metadata or {}, list(batch.schema))
     for field in batch.schema:
         module, _, kind = (field.metadata or {}).get(b"rerun:archetype", b"").decode().rpartition(".")
         if module.startswith("rerun.") and not hasattr(KINDS.get(module), kind):
