@@ -174,7 +174,7 @@ LAYERS: dict[str, list[tuple[str, ...]]] = {
         ("__main__", "fork_server"),
     ],
     "lsu_mesh_services.options": [("parsing",), (REST,)],
-    "lsu_mesh_services.network": [("access_control",), (REST,)],
+    "lsu_mesh_services.network": [("access_control",), (REST,), ("session_settings",)],
     "lsu_mesh_services.benchmarks": [
         ("checkout", "process_usage", "keep_results", "table"),
         ("process_group",),

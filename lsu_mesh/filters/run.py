@@ -137,7 +137,8 @@ def _step(filter: Filter, Y: Matrix, U: Matrix, rule: RowRule, run: FilterRun) -
 def _sweep(filter: CompiledLoop, Y: Matrix, U: Matrix, rule: RowRule, run: FilterRun) -> None:
     """All rows in the compiled loop, which stops at a contradiction and goes on after what the rule makes of it."""
     tables, row = [tuple.__getitem__(run, i) for i in range(len(run))], 0
-    run.status[:] = ["missing" if is_missing else "ok" for is_missing in np.isnan(Y).all(axis=1)]
+    is_missing = np.asarray(np.isnan(Y).all(axis=1))
+    run.status[:] = ["missing" if missing else "ok" for missing in is_missing.tolist()]
     while row < len(Y):
         record = run_tables.Record(*(table[np.newaxis, row:] for table in tables))
         sets = None if run.filter is None else run.sets

@@ -10,8 +10,8 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -27,7 +27,8 @@ from lsu_mesh.mesh.sequences import Head, read_head
 from lsu_mesh_services.network.gap_recovery import GapRecovery, RecoveryThread
 from lsu_mesh_services.network.link_repair import LinkRepair
 from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
-from lsu_mesh_services.network.security import Certificates
+from lsu_mesh_services.network.session_settings import SessionSettings as SessionSettings
+from lsu_mesh_services.network.session_settings import open_error, session_values
 
 LEASE_MS = 2000
 HEARTBEAT_S = 1.0
@@ -38,19 +39,6 @@ MAX_KEYS = 4096
 SETTLED_S, MAX_INTRODUCTION_S = 0.5, 5.0
 """A second session leaves the mesh when its links have not changed for so long, and after so long in any case. One that
 is closed while it opens links leaves them open, for as long as its process lives."""
-
-
-@dataclass(frozen=True)
-class SessionSettings:
-    """How to reach the mesh; ``zenoh`` holds further ``path=value`` settings of Zenoh itself."""
-
-    connect: Sequence[str] = ()
-    listen: Sequence[str] = ("tcp/127.0.0.1:0",)
-    mode: str = "peer"
-    cache: int = 256
-    multicast: bool = False
-    zenoh: Sequence[str] = ()
-    certificates: Certificates | None = None
 
 
 class NoSession(Exception):
@@ -86,7 +74,7 @@ class Bus:
         try:
             self._session = zenoh.open(_zenoh_configuration(settings))
         except zenoh.ZError as error:
-            raise NoSession(_explained(settings, str(error))) from None
+            raise NoSession(open_error(settings, str(error))) from None
 
     def __enter__(self) -> Self:
         return self
@@ -369,56 +357,7 @@ class Bus:
 
 
 def _zenoh_configuration(settings: SessionSettings) -> Any:
-    retry = {"period_init_ms": 200, "period_max_ms": 1000, "period_increase_factor": 2}
-    values: dict[str, object] = {
-        "mode": settings.mode,
-        "scouting/multicast/enabled": settings.multicast,
-        "scouting/gossip/enabled": True,
-        "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
-        "connect/endpoints": list(settings.connect),
-        "connect/timeout_ms": -1,
-        "connect/exit_on_failure": False,
-        "connect/retry": retry,
-        "listen/endpoints": list(settings.listen),
-        "transport/link/tx/lease": LEASE_MS,
-        "transport/link/tx/queue/congestion_control/block/wait_before_close": 500_000,
-        "transport/shared_memory/enabled": False,
-        "timestamping/enabled": True,
-        "adminspace/enabled": True,
-    }
-    values |= {} if settings.certificates is None else _security(settings.certificates)
     configuration = zenoh.Config()
-    for path, value in values.items():
-        configuration.insert_json5(path, json.dumps(value))
-    for item in settings.zenoh:
-        path, _, text = item.partition(":" if ":" in item.partition("=")[0] else "=")
+    for path, text in session_values(settings, LEASE_MS):
         configuration.insert_json5(path, text)
     return configuration
-
-
-def _security(files: Certificates) -> dict[str, object]:
-    """Encrypted links only; both ends show a certificate, and the rules say what its name may do."""
-    tls = {
-        "root_ca_certificate": str(files.authority),
-        "listen_certificate": str(files.certificate),
-        "listen_private_key": str(files.key),
-        "connect_certificate": str(files.certificate),
-        "connect_private_key": str(files.key),
-        "enable_mtls": True,
-        "verify_name_on_connect": files.verify_hosts,
-        "close_link_on_expiration": True,
-    }
-    values: dict[str, object] = {"transport/link/tls": tls, "transport/link/protocols": ["tls", "quic"]}
-    return values if files.access_control is None else {**values, "access_control": files.access_control}
-
-
-def _explained(settings: SessionSettings, error: str) -> str:
-    if "in use" in error.lower() or "listen" in error.lower():
-        listened = ", ".join(settings.listen)
-        router = " (rmw_zenohd, the router of ROS 2, and zenohd listen on 7447)" if ":7447" in listened else ""
-        return (
-            f"cannot listen on {listened}: {error}\n"
-            f"Another process holds the port{router}; stop it, or choose another one with "
-            '-X network.entry="tcp/127.0.0.1:PORT"'
-        )
-    return f"no Zenoh session: {error}"

@@ -392,10 +392,8 @@ class Configuration:
 
     def peers(self) -> list[tuple[str, str]]:
         """``(role, name)`` of every peer, in the order in which they are started."""
-        listed = [("recorder", "recorder")]
-        listed += [("fusion", name) for name in self.fusion]
-        listed += [("identifier", name) for name in self.identifiers]
-        listed += [("filter", name) for name in self.filters]
+        groups = (("fusion", [*self.fusion]), ("identifier", [*self.identifiers]), ("filter", [*self.filters]))
+        listed = [("recorder", "recorder"), *((role, name) for role, names in groups for name in names)]
         listed += [("sensor", name) for name in self.sensors]
         if self.plant is not None:
             listed.append(("plant", self.plant.name))
