@@ -265,12 +265,19 @@ class FilterBank:
     ) -> tuple[run_tables.Record, NDArray[np.int64]]:
         record = _record(len(self), Y.shape[1] if updates else 0, self._model.state_count, Y.shape[2])
         outcome = np.zeros((len(self), 2), dtype=np.int64)
-        data = LoopData(Y, with_offset(self._model, U), updates, last_prediction, points)
+        data = LoopData(Y, with_offset(self._model, U), updates, last_prediction, points=points)
         kept = np.empty((len(self), 0, 0))
 
         def share(first: int, last: int) -> None:
             self._filter.run_states(
-                self._states, self._models, self._estimates, data, LoopResult(record, outcome), first, last, kept
+                self._states,
+                self._models,
+                self._estimates,
+                data,
+                result=LoopResult(record, outcome),
+                first=first,
+                last=last,
+                kept=kept,
             )
 
         _in_shares(share, len(self), self._threads)

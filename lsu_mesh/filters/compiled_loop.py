@@ -98,8 +98,8 @@ class CompiledLoop(Filter):
         kept = np.empty((1, rows, states.shape[-1]))
         self.run_states(
             states, stacked_models([self.model]), estimates,
-            LoopData(Y[np.newaxis], with_offset(self.model, U)[np.newaxis], True, False, points),
-            LoopResult(record, outcome), 0, 1, kept,
+            LoopData(Y[np.newaxis], with_offset(self.model, U)[np.newaxis], True, False, points=points),
+            result=LoopResult(record, outcome), first=0, last=1, kept=kept,
         )  # fmt: skip
         done, where = int(outcome[0, 0]), int(outcome[0, 1])
         density = self.density

@@ -341,7 +341,9 @@ class LSUCZ(CompiledSets):
         body, (lower, upper) = self._held.body, self._stack_bounds()
         if not self._limits.allow(body):
             body, lower, upper = self._settled(body, lower, upper)[:3]
-        held = advanced(body, lower, upper, arrays, stacked_step(arrays, self._depth, self._lag), u=u, widths=widths)
+        held = advanced(
+            body, lower, upper, arrays, step=stacked_step(arrays, self._depth, self._lag), u=u, widths=widths
+        )
         if held is None:
             raise UnboundedSupport(f"the set of {self.kind} has outgrown double precision; reset it from a known set")
         return held if model.domain is None else within(held, model.domain)

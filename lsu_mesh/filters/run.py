@@ -142,7 +142,7 @@ def _sweep(filter: CompiledLoop, Y: Matrix, U: Matrix, rule: RowRule, run: Filte
     while row < len(Y):
         record = run_tables.Record(*(table[np.newaxis, row:] for table in tables))
         sets = None if run.filter is None else run.sets
-        done, where = filter.sweep(Y[row:], U[row:], record, run.has_points, sets)
+        done, where = filter.sweep(Y[row:], U[row:], record, run.has_points, sets=sets)
         row += done
         run.done = row
         if where == run_tables.IN_OUTPUT:

@@ -41,7 +41,7 @@ class Held(NamedTuple):
 def held_of(packed: PackedSet, density: Density | None) -> Held:
     """What compiled code has left."""
     (c, H, _, _), lower, upper, _ = packed
-    return Held(c, H, lower, upper, no_strips(c.size), density)
+    return Held(c, H, lower, upper, pending=no_strips(c.size), density=density)
 
 
 def corrected_by(held: Held, strips: Strips) -> Held:

@@ -51,7 +51,7 @@ class Stack(NamedTuple):
     @classmethod
     def of(cls, body: Body, lower: Vector, upper: Vector, limits: Limits) -> Stack:
         """A stack of one set, (c, G, A, b) ∩ [lower, upper]."""
-        return cls(Settled(body, lower, upper, empty=False), body, lower, upper, limits)
+        return cls(Settled(body, lower, upper, empty=False), body, lower, upper, limits=limits)
 
     @classmethod
     def of_support(cls, support: Support, bounds: tuple[Vector, Vector], limits: Limits) -> Stack:
@@ -106,7 +106,7 @@ class Stack(NamedTuple):
         if limit is None or self.body[1].shape[1] <= MAX_STACKED * limit:
             return self
         settled = self.settled()
-        return Stack(settled, settled.body, settled.lower, settled.upper, self.limits)
+        return Stack(settled, settled.body, settled.lower, settled.upper, limits=self.limits)
 
     def _met_part(self, part: Support) -> Stack:
         if isinstance(part, Orthotope):

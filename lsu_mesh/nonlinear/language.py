@@ -66,7 +66,7 @@ def parse(text: str, graph: Graph, names: Mapping[str, int], what: str) -> int:
         raise ExpressionError(f"{what}, {where}: {error.msg}: {_shown(text)}") from None
     except (RecursionError, MemoryError, ValueError):
         raise ExpressionError(f"{what} is nested too deeply, or holds a character that no expression has") from None
-    return _Reader(text, start, graph, names, what).read(tree.body)
+    return _Reader(text, start, graph, names, what=what).read(tree.body)
 
 
 def _place(text: str, offset: int) -> str:

@@ -54,7 +54,7 @@ def time_step(model: NonlinearModel, lower: Vector, upper: Vector, u_lower: Vect
     w = np.zeros(0) if is_added else rho
     low, high = np.concatenate([lower, u_lower, -w]), np.concatenate([upper, u_upper, w])
     found = Enclosed(model.dynamics, low, high, columns=np.arange(n))
-    _refuse_open(model.f, "f", found.is_enclosed, model.states, lower, upper)
+    _refuse_open(model.f, "f", found.is_enclosed, model.states, lower=lower, upper=upper)
     unknown = [j for j in range(n, n + p) if u_lower[j - n] < u_upper[j - n]]
     used = [*range(n + p, n + p + w.size), *unknown]
     widths = [np.nextafter(max(high[j] - found.center[j], found.center[j] - low[j]), np.inf) for j in unknown]

@@ -249,7 +249,12 @@ class Peer:
     def _reading(self) -> Reading:
         queue = self._bus.arrivals
         return Reading(
-            self._clock.now(), self._waited_ns, time.process_time_ns(), queue.taken, len(queue), queue.too_old
+            self._clock.now(),
+            self._waited_ns,
+            time.process_time_ns(),
+            queue.taken,
+            waiting=len(queue),
+            too_old=queue.too_old,
         )
 
     def _look_for_standstill(self, now: int) -> None:

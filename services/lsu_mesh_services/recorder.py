@@ -199,7 +199,9 @@ class RecorderService:
 
     def _reading(self) -> Reading:
         queue = self._bus.arrivals
-        return Reading(self._clock.now(), self._waited_ns, time.process_time_ns(), queue.taken, len(queue), 0)
+        return Reading(
+            self._clock.now(), self._waited_ns, time.process_time_ns(), queue.taken, waiting=len(queue), too_old=0
+        )
 
     def _take(self, arrival: Arrival) -> None:
         if arrival.what == "sample":

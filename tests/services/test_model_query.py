@@ -36,7 +36,7 @@ class Line:
         pass
 
     announce = subscribe = subscribe_live = watch_alive = declare_alive = ask = ask_cache = ignore
-    recover = bound_age = ignore
+    recover = bound_age = watch_listeners = ignore
 
 
 @pytest.mark.parametrize("changes", [[], ["filters.box.transfer=predictor"]], ids=["plain", "transfer"])

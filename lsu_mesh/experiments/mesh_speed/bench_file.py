@@ -68,7 +68,7 @@ def read_bench_file(path: Path) -> BenchFile:
     if not isinstance(cases, list) or not isinstance(machine, dict) or not all(_is_case(what, case) for case in cases):
         raise ModelError(f"{path}: its cases lack {', '.join(KINDS[what].keys)}, or its machine is missing")
     commit = values.get("commit")
-    return BenchFile(what, None if commit is None else str(commit), str(values.get("date")), machine, cases)
+    return BenchFile(what, None if commit is None else str(commit), str(values.get("date")), machine, cases=cases)
 
 
 def _is_case(what: str, case: object) -> bool:

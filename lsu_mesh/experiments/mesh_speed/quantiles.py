@@ -38,4 +38,4 @@ def quantiles(samples: Sequence[float]) -> Quantiles:
     """All quantiles of samples in any order; ``ValueError`` without samples."""
     ordered = sorted(samples)
     p50, p99, p999 = (quantile(ordered, permille) for permille in (500, 990, 999))
-    return Quantiles(len(ordered), p50, p99, p999, ordered[-1])
+    return Quantiles(len(ordered), p50, p99, p999, largest=ordered[-1])

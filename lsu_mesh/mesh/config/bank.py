@@ -68,11 +68,11 @@ def read_instances(
         if table is not None:
             note_keys(table)
         return None
-    _check_parts(system, filters, sensors, others, problems)
+    _check_parts(system, filters, sensors, others, problems=problems)
     count = next(iter(counts.values()))
     _check_faults(sensors, count, problems)
     found = _read_table(table, count, system, folder) if table is not None else Instances(count)
-    _check_banks(filters, sensors, found, system, problems)
+    _check_banks(filters, sensors, found, system, problems=problems)
     return found
 
 
@@ -240,7 +240,7 @@ def _read_table(table: Table, count: int, system: System, folder: Path) -> Insta
             if key in arrays:
                 table.wrong(key, f"is here and in {path} too; remove one of the two", "each part once")
             arrays[key] = array
-    return Instances(count, **_checked(table, arrays, count, system, path))
+    return Instances(count, **_checked(table, arrays, count, system, path=path))
 
 
 def _checked(table: Table, arrays: dict[str, Array], count: int, system: System, path: str | None) -> dict[str, Array]:

@@ -157,7 +157,7 @@ def _read(values: dict[str, Any], path: Path, problems: Problems) -> Configurati
     identifiers = {name: read_identifier(table, name, sensors) for name, table in identifier_tables.items()}
     check_learning(filters, fusion, identifiers, sound=sound, problems=problems)
     others = Others(plant, fusion, identifiers)
-    instances = read_instances(system, filters, sensors, others, path.parent, problems)
+    instances = read_instances(system, filters, sensors, others, folder=path.parent, problems=problems)
     recorder, network = _read_recorder(root), read_network(root)
     supervisor = _read_supervisor(root)
     root.finish()
@@ -252,7 +252,9 @@ def _read_recorder(root: Table) -> RecorderSettings:
     part_time = table.duration("part_time", RecorderSettings.part_time)
     predictions = table.flag("predictions", RecorderSettings.predictions)
     table.finish()
-    return RecorderSettings(path, flush, mesh_hz, axes, draw_hz, part_size, part_time, predictions)
+    return RecorderSettings(
+        path, flush, mesh_hz, axes, draw_hz=draw_hz, part_size=part_size, part_time=part_time, predictions=predictions
+    )
 
 
 def _read_supervisor(root: Table) -> SupervisorSettings:

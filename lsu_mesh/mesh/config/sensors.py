@@ -124,7 +124,7 @@ def _read_fault(table: Table) -> SensorFault:
     size = table.number("size", 1.0)
     named: list[int] = table.read("instances", [], INSTANCES)
     table.finish()
-    return SensorFault("bias" if kind is REQUIRED else kind, first, last, size, tuple(named))
+    return SensorFault("bias" if kind is REQUIRED else kind, first, last, size, instances=tuple(named))
 
 
 def _read_file(table: Table, count: int, folder: Path, per: str) -> MeasurementFileSettings | None:

@@ -110,7 +110,7 @@ class BankEngine:
             logs = np.log(volumes)
         logs[~np.isfinite(logs)] = np.nan
         return BankStep(
-            points, lower, upper, logs, statuses.astype(np.uint8).tobytes(),
+            points, lower, upper, logs, statuses=statuses.astype(np.uint8).tobytes(),
             contradicted=kept, reset=reset, lost=np.flatnonzero(self._lost),
         )  # fmt: skip
 

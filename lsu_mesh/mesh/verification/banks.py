@@ -154,7 +154,7 @@ class BankVerification:
                 self.excused.append("a measurement that exceeded its declared bound")
             else:
                 words = f"instance {i}"
-                self.misses.append(Miss(message.src, message.topic, message.step, message.seq, words))
+                self.misses.append(Miss(message.src, message.topic, message.step, message.seq, state=words))
 
     def _sensors_of(self, message: BankSets) -> tuple[str, ...]:
         filters, fusion = self._configuration.filters, self._configuration.fusion

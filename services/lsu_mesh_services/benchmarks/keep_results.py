@@ -36,7 +36,7 @@ def keep(
     if not options.save and not targets:
         return
     date = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
-    file = BenchFile(what, commit_of(tree or own_tree()), date, machine_facts(PACKAGES), cases)
+    file = BenchFile(what, commit_of(tree or own_tree()), date, machine_facts(PACKAGES), cases=cases)
     if options.save:
         HISTORY.mkdir(exist_ok=True)
         targets.append(HISTORY / file.file_name)

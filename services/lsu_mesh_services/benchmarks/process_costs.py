@@ -28,5 +28,5 @@ def process_costs(
         for what, turns in ((PROCESSES, report.mesh), (RELAY, report.relay)):
             cost = processor_ms_per_step(turns)
             steps, missing = (sum(len(turn.latencies_ms) for turn in turns), sum(turn.missing for turn in turns))
-            found += [] if cost is None else [Cost(what, peers, cost, UNIT, keeps_up(missing, steps))]
+            found += [] if cost is None else [Cost(what, peers, cost, UNIT, kept_up=keeps_up(missing, steps))]
     return sorted(found, key=lambda cost: cost.what)

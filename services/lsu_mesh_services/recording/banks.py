@@ -111,7 +111,7 @@ class BankDrawings:
 
 def band_entity(target: int, state: str, peer: str) -> str:
     """Entity of the band of one target."""
-    return path("targets", str(target), state, "bands", peer)
+    return path("targets", str(target), state, *("bands", peer))
 
 
 def truth_entity(target: int, state: str) -> str:

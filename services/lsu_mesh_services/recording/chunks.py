@@ -130,7 +130,9 @@ def read_rows(entity: str, batch: pa.RecordBatch) -> tuple[Rows, Flags]:
     expected = _column(batch, "crc") if has_checksums else [None] * batch.num_rows
     is_complete = not any(None in column for column in (keys, arrivals, payloads, numbers))
     if has_checksums and is_complete and checksums(keys, arrivals, numbers, payloads) == expected:
-        rows = Rows(entity, keys, arrivals, payloads, np.array(numbers, dtype=np.int64), steps, is_checked=True)
+        rows = Rows(
+            entity, keys, arrivals, payloads, numbers=np.array(numbers, dtype=np.int64), steps=steps, is_checked=True
+        )
         return rows, np.ones(len(keys), dtype=np.bool_)
     columns = list(zip(keys, arrivals, numbers, payloads, expected, strict=True))
     good = np.fromiter(map(_is_right, columns), dtype=np.bool_, count=len(columns))
@@ -140,7 +142,9 @@ def read_rows(entity: str, batch: pa.RecordBatch) -> tuple[Rows, Flags]:
         keys, arrivals, numbers, payloads, expected = parts
         steps = steps[good]
     is_checked = None not in expected
-    return Rows(entity, keys, arrivals, payloads, np.array(numbers, dtype=np.int64), steps, is_checked), good
+    return Rows(
+        entity, keys, arrivals, payloads, numbers=np.array(numbers, dtype=np.int64), steps=steps, is_checked=is_checked
+    ), good
 
 
 def _is_right(row: tuple[Any, Any, Any, Any, Any]) -> bool:

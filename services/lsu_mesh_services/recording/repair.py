@@ -118,7 +118,7 @@ def _copy_whole(source: Path, file: BinaryIO | None, damage: Damage, losses: Los
             new_store(store).write(file)  # the message that said so is damaged
         named.add(store)
         if frame.kind == ARROW:
-            rows += _copy_chunk(frame, source, file, damage, losses, b"" if is_known else store)
+            rows += _copy_chunk(frame, source, file, damage, losses=losses, store=b"" if is_known else store)
         elif file is not None:
             frame.write(file)
     return _Copied(len(named - {b""}), rows)

@@ -255,7 +255,7 @@ def test_a_recording_of_another_arithmetic(
 
     path = record(mesh, tmp_path / "other.rrd", wider)
     numbers = json.loads(read_recording(path).description["algorithms"])
-    assert numbers == {"LSUCZ": 3, "LSUO": 2, "LSUP": 3, "intersect": 3}
+    assert numbers == {"LSUCZ": 3, "LSUO": 2, "LSUP": 3, "intersect": 4}
     monkeypatch.setattr(LSUCZ, "algorithm", 4)
     assert main(["replay", str(path), "--verify"]) == OK
     out = capsys.readouterr().out
