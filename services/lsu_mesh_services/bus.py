@@ -8,17 +8,12 @@ is recovered), it never blocks. Callbacks only stamp the arrival and put into a 
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
-os.environ.setdefault(  # one thread of its own for Zenoh instead of six, between which each message is handed on
-    "ZENOH_RUNTIME",
-    "(app: (worker_threads: 1), acc: (handover: app), net: (handover: app), rx: (handover: app), tx: (handover: app))",
-)
 import zenoh
 from zenoh import ext
 
@@ -31,9 +26,8 @@ from lsu_mesh_services.network.session_settings import SessionSettings as Sessio
 from lsu_mesh_services.network.session_settings import open_error, session_values
 
 LEASE_MS = 2000
-HEARTBEAT_S = 1.0
-"""So often each publisher tells its newest number: who has missed the last messages of a stream learns of it. A message
-that was lost before others is missed when the next one comes."""
+HEARTBEAT_S = 0.1
+"""So often each publisher tells its newest number: who has missed the last messages of a stream learns of it."""
 MAX_KEYS = 4096
 """Keys whose numbers are compared with those of Zenoh."""
 SETTLED_S, MAX_INTRODUCTION_S = 0.5, 5.0

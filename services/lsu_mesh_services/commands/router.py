@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 
-os.environ.setdefault("ZENOH_RUNTIME", "()")  # as many threads as Zenoh takes by itself: a router works for many peers
 from lsu_mesh.mesh.keys import ROUTER
 from lsu_mesh_services.bus import Bus, Clock, SessionSettings
 from lsu_mesh_services.configuration import load_or_explain
