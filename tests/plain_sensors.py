@@ -64,6 +64,9 @@ def main(endpoint: str, mesh: str, filter_name: str, steps: int) -> None:
         print(json.dumps(model), flush=True)
         while not all(publisher.matching_status.matching for publisher in publishers.values()):
             time.sleep(0.01)
+        time.sleep(
+            1.0
+        )  # some reader is there; a recorder's subscription may come a moment later, and there is no cache
         for step in range(1, steps + 1):
             for name, publisher in publishers.items():
                 publisher.put(measurement(name, model["model"], step))

@@ -20,6 +20,8 @@ from lsu_mesh.mesh.messages import Posterior, decode
 pytestmark = pytest.mark.live
 
 Start = Callable[..., Any]
+FORGOTTEN = 70
+"""Steps of .1 s: publishers keep those of six seconds."""
 
 
 def mesh_file(folder: Path, text: str = TEXT) -> Path:
@@ -111,6 +113,8 @@ def test_a_bank_that_was_killed_takes_up_what_the_fusion_kept(start: Start, tmp_
     with connect(file, wait=2 * WITHIN) as mesh:
         estimates, fused = mesh.bank("targets"), mesh.bank("main")
         before = received(estimates, 5)[-1]
+        while before.step <= FORGOTTEN:  # no cache holds the first steps: no way from the prior
+            before = received(estimates, 1)[-1]
         received(fused, 5)
         one = mesh.latest("main", target=3)
         assert one is not None
@@ -119,6 +123,8 @@ def test_a_bank_that_was_killed_takes_up_what_the_fusion_kept(start: Start, tmp_
         end = time.monotonic() + 2 * WITHIN
         while (again := received(estimates, 1)[0]).raw["boot"] == before.raw["boot"]:
             assert time.monotonic() < end, "it did not start again"
+        again = min([again, *received(estimates, 5)], key=lambda one: int(one.raw["seq"]))  # a cache may answer later
+        assert again.raw["seq"] == 0
         assert set(again.statuses) == {STATUSES.index("restarted")}
         assert again.raw["base"][:3] == ["bank_posterior", "filter/targets", before.raw["boot"]]
         assert received(estimates, 3)[-1].status(3) == "ok"
