@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.skipif(why_not() is not None, reason=why_not() or ""),
 ]
 SETS, PLOTS = Area(right=0.4, bottom=0.7), Area(left=0.41, bottom=0.73)
-VOLUME = Area(left=0.41, right=0.9, top=0.78, bottom=0.95)
+VOLUME = Area(left=0.41, right=0.9, top=0.772, bottom=0.95)
 ARRIVAL_NS = 3_000_000
 """How long every message takes to the recorder."""
 
