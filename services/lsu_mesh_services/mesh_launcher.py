@@ -33,8 +33,6 @@ READY_S = 60.0
 LINKS_S = 10.0
 """How long to wait for the last connections when all peers are there."""
 START_LEAD_S = 0.3
-LIVE_LEAD_S = 2.0
-"""So long after the launch t_0 of a mesh lies that starts now: its prior is of that moment."""
 MAX_AT_ONCE = 1024
 """Messages that are processed before the children and the stop flag are checked again, however many more wait."""
 START_ORDER = ("recorder", "plant", "sensor", "identifier", "fusion", "filter")
@@ -152,7 +150,7 @@ def _run_mesh(
     stop: Stop = options.stop
     clock = Clock()
     if configuration.awaits_start:
-        configuration = configuration.started(clock.now() + int(LIVE_LEAD_S * 1e9))
+        configuration = configuration.started(clock.now())  # whatever is measured from now on is of use
     settings = _session_settings(configuration, options)
     with Bus(settings, clock) as bus:
         recording = None if options.no_record else _recording_path(configuration, options)

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 LOOK_AT_LINKS_NS = 100_000_000
 STANDSTILL_NS = 1_000_000_000
 """So long between two turns of the loop, and the process stood still; so long after it, live data are not believed."""
-MAX_STANDING_SHARE = 0.1
-"""Of that time the loop has computed less than this, where it was stopped and not busy."""
 SPARED = "input"
 """The topic that a late peer keeps for as long as it can: without inputs a set cannot be carried on."""
 MAX_WAIT = 0.1
@@ -135,7 +133,7 @@ class Peer:
         node.admission.wanted_again = self._want_again
         self._waited_ns = 0
         self._need = ProcessorNeed(self._reading())
-        self._computed_ns, self._copies = time.thread_time_ns(), 0
+        self._copies = 0
 
     def declare(self) -> None:
         """Publishers, subscriptions, the liveliness token, queries and answers."""
@@ -259,12 +257,9 @@ class Peer:
 
     def _look_for_standstill(self, now: int) -> None:
         """A process that was stopped cannot tell how long ago came what waited for it."""
-        computed_ns, passed = time.thread_time_ns(), now - self._turned_at
-        if passed > STANDSTILL_NS:
+        if now - self._turned_at > STANDSTILL_NS:
             self._settled_at = now + STANDSTILL_NS
-            if computed_ns - self._computed_ns < MAX_STANDING_SHARE * passed:
-                self._bus.arrivals.excuse(now)
-        self._turned_at, self._computed_ns = now, computed_ns
+        self._turned_at = now
         self._node.admission.stood_still = now < self._settled_at
 
     def _watch_links(self) -> None:

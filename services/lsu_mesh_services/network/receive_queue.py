@@ -15,8 +15,8 @@ from typing import NamedTuple
 from lsu_mesh.mesh.lost_messages import Loss
 from lsu_mesh.mesh.sequences import Head
 from lsu_mesh_services.network.received_numbers import Gap, Number, ReceivedNumbers, as_ranges
+from lsu_mesh_services.network.standstill import SECOND_NS, Standstill
 
-SECOND_NS = 1_000_000_000
 MAX_MESSAGES, MAX_BYTES = 65536, 2**26
 """Messages and bytes that may wait; the oldest beyond that are dropped and counted, and asked for again."""
 MAX_LATE_NS = SECOND_NS
@@ -45,6 +45,7 @@ class ReceiveQueue:
         self._bytes = 0
         self._numbers = ReceivedNumbers()
         self._now: Callable[[], int] | None = None
+        self._standstill = Standstill()
         self._max_age_ns = 0
         self._spares: Callable[[str], bool] = lambda _: False
         self._max_spared_ns: int | None = 0
@@ -66,9 +67,14 @@ class ReceiveQueue:
         spares: Callable[[str], bool] = lambda _: False,
         *,
         max_spared_ns: int | None = None,
+        standstill: Standstill | None = None,
     ) -> None:
-        """Let no message wait for longer; those whose key is spared may for ``max_spared_ns`` (None: for ever)."""
+        """Let no message wait for longer; those whose key is spared may for ``max_spared_ns`` (None: for ever).
+
+        What waited while the taking thread stood still, as ``standstill`` sees it, waits from then on.
+        """
         self._max_age_ns, self._now, self._spares, self._max_spared_ns = max_age_ns, now, spares, max_spared_ns
+        self._standstill = standstill or Standstill()
 
     # -- from the network
 
@@ -125,8 +131,13 @@ class ReceiveQueue:
                 self.is_late = False
                 if timeout > 0:
                     self._changed.wait_for(lambda: bool(self._waiting), timeout)
-            if self._now is not None and self._waiting:
-                self._skip_ahead(self._now())
+            if self._now is not None:
+                now = self._now()
+                if self._standstill.look(now):
+                    self._excused_until = now
+                    self._numbers.excuse(now)
+                if self._waiting:
+                    self._skip_ahead(now)
             if not self._waiting:
                 return None
             arrival, _ = self._waiting.popleft()
@@ -162,12 +173,6 @@ class ReceiveQueue:
             if self._now is None or not self._waiting:
                 return False
             return self.is_late or self._age(self._waiting[0][0], self._now()) > MAX_LATE_NS
-
-    def excuse(self, now: int) -> None:
-        """The process stood still: what has come before has waited since now only."""
-        with self._changed:
-            self._excused_until = now
-            self._numbers.excuse(now)
 
     def take_losses(self) -> list[Loss]:
         """What has been given up since the last call."""

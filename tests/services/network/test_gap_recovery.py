@@ -124,7 +124,7 @@ def test_a_process_that_stood_still_asks_for_what_it_missed_before() -> None:
     queue = ReceiveQueue()
     recovery, asked = recovery_of(queue, kept_ns=2 * SECOND_NS)
     came(queue, 0, 5)
-    queue.excuse(60 * SECOND_NS)
+    queue.excuse_gaps(60 * SECOND_NS)
     assert recovery.check(60 * SECOND_NS) == recovery.check(61 * SECOND_NS) == []
     assert asked == [(INPUT, (1, 4))]
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 
+import pytest
 from lsu_mesh_services.network.receive_queue import SECOND_NS, Arrival, ReceiveQueue
+from lsu_mesh_services.network.standstill import Standstill
 
 from lsu_mesh.mesh.lost_messages import Loss
 from lsu_mesh.mesh.sequences import Head
@@ -116,11 +118,20 @@ def test_a_queue_within_its_bound_gives_up_nothing() -> None:
     assert (arrivals.too_old, arrivals.take_losses(), arrivals.is_late) == (0, [], False)
 
 
-def test_a_process_that_stood_still_is_excused() -> None:
-    arrivals = aged({"data": [50.0, 40.0]})
-    arrivals.excuse(100 * SECOND_NS)
-    assert len(taken(arrivals)) == 2
-    assert arrivals.too_old == 0
+@pytest.mark.parametrize(("used_ns", "too_old"), [(0, 0), (8 * SECOND_NS, 2)], ids=["stopped", "busy"])
+def test_what_waited_while_the_process_stood_still_waits_from_then_on(used_ns: int, too_old: int) -> None:
+    """It may be stopped while it takes a message and while it uses one; a busy thread is not excused."""
+    now, used = [100 * SECOND_NS], [0]
+    arrivals = ReceiveQueue()
+    arrivals.bound_age(6 * SECOND_NS, lambda: now[0], standstill=Standstill(lambda: used[0]))
+    for seq in range(4):
+        arrivals.put(Arrival("sample", "data", b"x", now[0]), Head(BOOT, seq, seq))
+    assert arrivals.next(0) is not None
+    assert arrivals.next(0) is not None
+    now[0] += 9 * SECOND_NS
+    used[0] += used_ns
+    assert len(taken(arrivals)) == 2 - too_old
+    assert arrivals.too_old == too_old
 
 
 def test_who_came_long_ago_is_told_all_the_same() -> None:
