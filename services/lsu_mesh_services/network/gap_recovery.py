@@ -12,8 +12,9 @@ from collections.abc import Callable
 from itertools import pairwise
 
 from lsu_mesh.mesh.lost_messages import Loss
-from lsu_mesh_services.network.receive_queue import SECOND_NS, ReceiveQueue
+from lsu_mesh_services.network.receive_queue import ReceiveQueue
 from lsu_mesh_services.network.received_numbers import Gap, Stream
+from lsu_mesh_services.network.standstill import SECOND_NS
 
 LOOK_NS = SECOND_NS // 2
 """Between two looks. After an outage of four seconds publishers keep what was missed for two more."""

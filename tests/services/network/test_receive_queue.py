@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 
 import pytest
-from lsu_mesh_services.network.receive_queue import SECOND_NS, Arrival, ReceiveQueue
-from lsu_mesh_services.network.standstill import Standstill
+from lsu_mesh_services.network.receive_queue import Arrival, ReceiveQueue
+from lsu_mesh_services.network.standstill import SECOND_NS, Standstill
 
 from lsu_mesh.mesh.lost_messages import Loss
 from lsu_mesh.mesh.sequences import Head
